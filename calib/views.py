@@ -1,0 +1,173 @@
+"""What the calibration works on: a board, and views of it with what the robot logged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+Mount = Literal["eye_in_hand", "eye_to_hand"]
+
+
+@dataclass(frozen=True)
+class Board:
+    """A planar target; its corners are named (row, col).
+
+    For a chessboard `rows` and `cols` count inner corners; for a ChArUco board they are
+    `squares_y - 1` and `squares_x - 1`.
+
+    Attributes
+    ----------
+    kind, rows, cols, square_m:
+        What it is, its inner corners, and the side of a square in metres.
+    marker_m, dictionary:
+        ChArUco only: marker side in metres, OpenCV dictionary name.
+    """
+
+    kind: Literal["chessboard", "charuco"]
+    rows: int
+    cols: int
+    square_m: float
+    marker_m: float | None = None
+    dictionary: str | None = None
+
+    @property
+    def corner_count(self) -> int:
+        """Number of inner corners."""
+        return self.rows * self.cols
+
+    @property
+    def corners_m(self) -> FloatArray:
+        """(rows*cols, 3) nominal corners in the board frame, metres, row by row, z = 0.
+
+        Origin at corner (0, 0), x along columns, y along rows, z away from the viewer.
+        """
+        row, col = np.divmod(np.arange(self.corner_count), self.cols)
+        return np.stack([col, row, 0 * row], axis=1) * self.square_m
+
+
+@dataclass(frozen=True)
+class Views:
+    """N views of one board, as plain arrays; a value that was not logged is NaN.
+
+    Attributes
+    ----------
+    board, mount, width_px, height_px:
+        The target, where the camera sits, the image's size.
+    frame:
+        (N,) frame numbers, in the order of the recording.
+    corners_px:
+        (N, M, 2) detected corners, pixels, (0, 0) at the centre of the top-left pixel.
+    base_from_flange:
+        (N, 4, 4) logged flange poses.
+    joints_rad, joint_velocity_rad_s, approach_joints_rad:
+        (N, J) logged joints, their speeds, and the joints the move came from.
+    t_s, temperature_c, focus_position, focus_distance_m, exposure_s:
+        (N,) further columns of the log.
+    corner_sigma_px:
+        (N, M) the detector's own one-sigma per axis.
+    blur_px:
+        (N,) edge blur (Gaussian sigma) of the frame, where pictures were seen.
+    robot_model:
+        Name of the arm's kinematic model, or None.
+    payload_kg:
+        Mass at the flange, where known.
+    moving:
+        True when the frames were captured in motion.
+    """
+
+    board: Board
+    mount: Mount
+    width_px: int
+    height_px: int
+    frame: NDArray[np.int64]
+    corners_px: FloatArray
+    base_from_flange: FloatArray
+    joints_rad: FloatArray
+    joint_velocity_rad_s: FloatArray
+    approach_joints_rad: FloatArray
+    t_s: FloatArray
+    temperature_c: FloatArray
+    focus_position: FloatArray
+    focus_distance_m: FloatArray
+    exposure_s: FloatArray
+    corner_sigma_px: FloatArray
+    blur_px: FloatArray
+    robot_model: str | None = None
+    payload_kg: float | None = None
+    moving: bool = False
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    @cached_property
+    def seen(self) -> BoolArray:
+        """(N, M) which corners were detected."""
+        return np.isfinite(self.corners_px).all(axis=2)
+
+    @cached_property
+    def has_pose(self) -> BoolArray:
+        """(N,) which frames have a logged flange pose."""
+        return np.isfinite(self.base_from_flange).all(axis=(1, 2))
+
+    def take(self, index: NDArray[np.int64] | BoolArray) -> Views:
+        """The views at `index` (integers or a mask), in that order."""
+        return replace(self, **{name: getattr(self, name)[index] for name in _PER_FRAME})
+
+    @classmethod
+    def blank(
+        cls,
+        board: Board,
+        *,
+        width_px: int,
+        height_px: int,
+        frames: int,
+        mount: Mount = "eye_in_hand",
+        joints: int = 6,
+    ) -> Views:
+        """Views with every logged value missing, to be filled with `dataclasses.replace`."""
+
+        def missing(*shape: int) -> FloatArray:
+            return np.full((frames, *shape), np.nan)
+
+        return cls(
+            board=board,
+            mount=mount,
+            width_px=width_px,
+            height_px=height_px,
+            frame=np.arange(frames),
+            corners_px=missing(board.corner_count, 2),
+            base_from_flange=missing(4, 4),
+            joints_rad=missing(joints),
+            joint_velocity_rad_s=missing(joints),
+            approach_joints_rad=missing(joints),
+            t_s=missing(),
+            temperature_c=missing(),
+            focus_position=missing(),
+            focus_distance_m=missing(),
+            exposure_s=missing(),
+            corner_sigma_px=missing(board.corner_count),
+            blur_px=missing(),
+        )
+
+
+_PER_FRAME = (
+    "frame",
+    "corners_px",
+    "base_from_flange",
+    "joints_rad",
+    "joint_velocity_rad_s",
+    "approach_joints_rad",
+    "t_s",
+    "temperature_c",
+    "focus_position",
+    "focus_distance_m",
+    "exposure_s",
+    "corner_sigma_px",
+    "blur_px",
+)

@@ -1,0 +1,1 @@
+"""Arms and cameras behind two small protocols, one plain class per device."""
