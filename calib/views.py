@@ -108,12 +108,12 @@ class Views:
     @cached_property
     def seen(self) -> BoolArray:
         """(N, M) which corners were detected."""
-        return np.isfinite(self.corners_px).all(axis=2)
+        return np.asarray(np.isfinite(self.corners_px).all(axis=2))
 
     @cached_property
     def has_pose(self) -> BoolArray:
         """(N,) which frames have a logged flange pose."""
-        return np.isfinite(self.base_from_flange).all(axis=(1, 2))
+        return np.asarray(np.isfinite(self.base_from_flange).all(axis=(1, 2)))
 
     def take(self, index: NDArray[np.int64] | BoolArray) -> Views:
         """The views at `index` (integers or a mask), in that order."""

@@ -61,7 +61,7 @@ class Camera(Protocol):
         """Set and read back; returns what the camera then has. Raises `DeviceRefused` if unlike."""
 
     def focus(self, setting: FocusSetting) -> float | None:
-        """Bring the focus there, wait until ready, return the position read back (None: unknown)."""
+        """Focus, wait until ready, return the position read back (None: unknown)."""
 
     def grab(self, timeout_s: float) -> Frame:
         """Trigger and return the frame of this trigger, never an older one; raises `FrameLost`."""

@@ -1,1 +1,1 @@
-"""The simulated cell: an arm and a camera in process, and peers that speak the protocols of real devices."""
+"""The simulated cell: arm and camera in process, and peers that speak real devices' protocols."""
