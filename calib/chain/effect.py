@@ -1,0 +1,141 @@
+"""What an effect is: one departure from the plain chain, said in one small file of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from calib.views import FloatArray, Views
+
+if TYPE_CHECKING:
+    from calib.chain.walk import Walk
+
+Link = Literal["clock", "arm", "mount", "board", "lens", "sensor"]
+Role = Literal["amount", "shape", "setting"]
+
+LINKS: tuple[Link, ...] = ("clock", "arm", "mount", "board", "lens", "sensor")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect.
+
+    Attributes
+    ----------
+    name, unit:
+        As they stand in files; the name carries the unit.
+    typical:
+        A usual size where the effect is present, in `unit`.
+    low, high:
+        What a sane cell can have.
+    role:
+        `amount`: zero where the effect is absent, fitted. `shape`: fitted once the amount is not
+        zero (a time constant). `setting`: given, never fitted (a node's place).
+    identifiable:
+        False where hand-eye or board pose absorb it, so that it can be simulated but not fitted.
+    """
+
+    name: str
+    unit: str
+    typical: float
+    low: float
+    high: float
+    role: Role = "amount"
+    identifiable: bool = True
+
+
+def _one_candidate(views: Views) -> Sequence[Mapping[str, float]]:
+    return ({},)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A departure from the plain chain.
+
+    Attributes
+    ----------
+    name, law:
+        Name in the contract, and which of several laws this is, if there are several.
+    link:
+        Where in the chain it acts.
+    physics:
+        One plain sentence for a technician.
+    equation, source:
+        What it does, and where that is written.
+    parameters:
+        Its numbers.
+    act:
+        Changes the walk, given the parameters' values in their order.
+    needs:
+        Columns of `Views` that must have been logged.
+    varies:
+        False where the effect cannot be told from the plain chain unless the frames moved.
+    confounded_with:
+        Names of effects that look alike.
+    remedy:
+        What the technician can do about it.
+    candidates:
+        Values of shapes and settings worth trying on these views.
+    """
+
+    name: str
+    link: Link
+    physics: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    act: Callable[[FloatArray, Walk], None]
+    remedy: str
+    law: str | None = None
+    needs: tuple[str, ...] = ()
+    moving_only: bool = False
+    confounded_with: tuple[str, ...] = ()
+    candidates: Callable[[Views], Sequence[Mapping[str, float]]] = _one_candidate
+
+    @property
+    def label(self) -> str:
+        """Name and law, unique in the catalogue."""
+        return self.name if self.law is None else f"{self.name}:{self.law}"
+
+    def values(self, given: Mapping[str, float]) -> FloatArray:
+        """(P,) parameters in order; amounts not given are zero, shapes and settings typical.
+
+        Raises
+        ------
+        KeyError
+            For a name that is no parameter of this effect.
+        """
+        names = {p.name for p in self.parameters}
+        for name in given:
+            if name not in names:
+                raise KeyError(
+                    f"{self.label} has no parameter {name!r}; it has {', '.join(sorted(names))}"
+                )
+        return np.array(
+            [given.get(p.name, 0.0 if p.role == "amount" else p.typical) for p in self.parameters]
+        )
+
+    def missing(self, views: Views) -> str | None:
+        """Say which needed column was never logged, or None when the effect can be seen."""
+        if self.moving_only and not views.moving:
+            return "nothing moved while the frames were captured"
+        for column in self.needs:
+            value = getattr(views, column)
+            if value is None or (isinstance(value, np.ndarray) and not np.isfinite(value).any()):
+                return f"{column} was not logged"
+        return None
+
+
+@dataclass(frozen=True)
+class Present:
+    """An effect with its values: part of a cell model."""
+
+    effect: Effect
+    values: FloatArray
+
+    def as_mapping(self) -> dict[str, float]:
+        """Parameter name to value."""
+        return {p.name: float(v) for p, v in zip(self.effect.parameters, self.values, strict=True)}

@@ -1,0 +1,27 @@
+"""Board: its axes are not square to each other, or not of one scale."""
+
+from __future__ import annotations
+
+from calib.chain.effect import Effect, Parameter
+from calib.chain.walk import Walk
+from calib.views import FloatArray
+
+
+def _act(values: FloatArray, walk: Walk) -> None:
+    walk.points_m[:, 0] += values[0] * walk.points_m[:, 1]
+    walk.points_m[:, 1] *= 1.0 + values[1]
+
+
+EFFECT = Effect(
+    name="board_shear",
+    link="board",
+    physics="The print is skewed: rows and columns are not square, or differ in scale.",
+    equation="x = x + shear * y; y = (1 + aspect) * y",
+    source="affine printer error",
+    parameters=(
+        Parameter("shear", "1", 1e-3, -0.1, 0.1),
+        Parameter("aspect", "1", 1e-3, -0.1, 0.1),
+    ),
+    act=_act,
+    remedy="Print the board on another machine, or let the twin carry its shape.",
+)

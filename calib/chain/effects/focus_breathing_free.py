@@ -1,0 +1,48 @@
+"""Lens: the focal length follows the focus along some smooth curve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from calib.chain.effect import Effect, Parameter
+from calib.chain.walk import Walk
+from calib.views import FloatArray, Views
+
+_NODES = 5
+
+
+def _act(values: FloatArray, walk: Walk) -> None:
+    near_m, far_m = values[_NODES - 1], values[_NODES]
+    at = np.linspace(0.0, 1.0, _NODES)
+    curve = CubicSpline(at, np.concatenate([values[: _NODES - 1], [0.0]]), bc_type="natural")
+    inverse = np.clip(1.0 / walk.distance_m, 0.5 / far_m, 2.0 / near_m)
+    where = (1.0 / near_m - inverse) / (1.0 / near_m - 1.0 / far_m)
+    growth = 1.0 + curve(where)
+    walk.column("alpha_px")[:] *= growth
+    walk.column("beta_px")[:] *= growth
+
+
+def _candidates(views: Views) -> Sequence[Mapping[str, float]]:
+    return ({"near_m": 0.3, "far_m": 1.2}, {"near_m": 0.15, "far_m": 0.7})
+
+
+EFFECT = Effect(
+    name="focus_breathing",
+    law="free",
+    link="lens",
+    physics="The lens moves to focus, so its focal length depends on the distance of the board.",
+    equation="alpha = alpha_far * (1 + natural cubic spline in 1/d through 5 nodes)",
+    source="focus tables of cine lenses; Willson 1994 (parameters against motor position)",
+    parameters=(
+        *(Parameter(f"node_{i}", "1", 0.01, -0.5, 0.5) for i in range(1, _NODES)),
+        Parameter("near_m", "m", 0.3, 0.01, 10.0, role="setting"),
+        Parameter("far_m", "m", 1.2, 0.02, 100.0, role="setting"),
+    ),
+    act=_act,
+    confounded_with=("thermal_focal_drift",),
+    remedy="Lock the focus, or use the focal length of each distance (the twin has it).",
+    candidates=_candidates,
+)

@@ -1,0 +1,30 @@
+"""Lens: the focal length follows the focus by the paper's own law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calib.chain.effect import Effect, Parameter
+from calib.chain.walk import Walk
+from calib.views import FloatArray
+
+
+def _act(values: FloatArray, walk: Walk) -> None:
+    near = 1.0 / np.square(walk.distance_m)
+    ratio = walk.column("beta_px") / walk.column("alpha_px")
+    walk.column("alpha_px")[:] -= values[0] * near
+    walk.column("beta_px")[:] -= values[0] * near * ratio
+
+
+EFFECT = Effect(
+    name="focus_breathing",
+    law="inverse_square",
+    link="lens",
+    physics="The lens moves to focus, so its focal length depends on the distance of the board.",
+    equation="alpha = alpha0 - k / d^2, d the depth of the board's centre",
+    source="Ricolfe-Viala, The influence of the focus in the camera calibration process, Eq. 25",
+    parameters=(Parameter("k_px_m2", "px m^2", 10.0, -2000.0, 2000.0),),
+    act=_act,
+    confounded_with=("thermal_focal_drift",),
+    remedy="Lock the focus, or use the focal length of each distance (the twin has it).",
+)

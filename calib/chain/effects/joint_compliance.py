@@ -1,0 +1,33 @@
+"""Arm: the joints give way under gravity."""
+
+from __future__ import annotations
+
+from calib.chain.effect import Effect, Parameter
+from calib.chain.walk import Walk
+from calib.views import FloatArray
+
+
+def _act(values: FloatArray, walk: Walk) -> None:
+    if walk.arm is None:
+        return
+    payload_kg = walk.views.payload_kg or 0.0
+    walk.joints_rad = walk.joints_rad + values * walk.arm.gravity_torques(
+        walk.views.joints_rad, payload_kg
+    )
+
+
+EFFECT = Effect(
+    name="joint_compliance",
+    link="arm",
+    physics="The joints sag under the weight of arm and camera, each in proportion to its load.",
+    equation="q_true = q_logged + rad_per_Nm * gravity_torque(q)",
+    source="Klimchik, Pashkevich, Chablat 2013 (virtual joint model, static load)",
+    parameters=tuple(
+        Parameter(f"rad_per_Nm_{j}", "rad/Nm", 2e-5, -1e-3, 1e-3, identifiable=1 < j < 6)
+        for j in range(1, 7)
+    ),
+    act=_act,
+    needs=("joints_rad",),
+    confounded_with=("mount_flex", "joint_periodic_error"),
+    remedy="Enter the true payload in the controller, or let the twin correct the flange pose.",
+)

@@ -1,0 +1,33 @@
+"""Mount: it drifts as the camera warms it."""
+
+from __future__ import annotations
+
+from calib.chain import rigid
+from calib.chain.effect import Effect, Parameter
+from calib.chain.steps import SIX
+from calib.chain.walk import Walk
+from calib.chain.warming import TIME_CONSTANT, warming_candidates, warmth
+from calib.views import FloatArray
+
+
+def _act(values: FloatArray, walk: Walk) -> None:
+    drift = warmth(values[6], walk.views)[:, None] * values[:6]
+    walk.flange_from_mounted = walk.flange_from_mounted @ rigid.from_vector(drift)
+
+
+EFFECT = Effect(
+    name="thermal_mount_drift",
+    link="mount",
+    physics="The bracket warms up and carries the camera slowly away.",
+    equation="flange_from_mounted = cold * exp(drift * (1 - exp(-t / tau)))",
+    source="first-order warm-up, as for camera mounts in Handel 2007 and Podbreznik 2011",
+    parameters=(
+        *(Parameter(p.name, p.unit, p.typical, p.low, p.high) for p in SIX),
+        TIME_CONSTANT,
+    ),
+    act=_act,
+    needs=("t_s",),
+    confounded_with=("mount_slip", "board_slip", "thermal_focal_drift"),
+    remedy="Let camera and robot warm up before the run (three time constants).",
+    candidates=warming_candidates,
+)

@@ -1,0 +1,118 @@
+"""A cell as the chain sees it, and the walk along its links."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from calib.chain import rigid
+from calib.chain.effect import LINKS, Link, Present
+from calib.chain.kinematics import ArmKinematics, arm
+from calib.chain.projection import project
+from calib.chain.walk import Walk
+from calib.views import FloatArray, Views
+
+
+@dataclass(frozen=True)
+class CellModel:
+    """The plain chain's constants and the effects that it leaves out.
+
+    Attributes
+    ----------
+    optics:
+        (K,) the camera, see `calib.chain.optics`.
+    flange_from_mounted:
+        (4, 4) flange_from_camera for an eye in hand, flange_from_board else.
+    base_from_fixed:
+        (4, 4) base_from_board for an eye in hand, base_from_camera else.
+    effects:
+        What departs from the plain chain, in any order; the walk sorts them by link.
+    corner_offsets_m:
+        (M, 3) where the printed corners lie off their grid, or None.
+    """
+
+    optics: FloatArray
+    flange_from_mounted: FloatArray
+    base_from_fixed: FloatArray
+    effects: tuple[Present, ...] = field(default=())
+    corner_offsets_m: FloatArray | None = None
+
+    def with_effects(self, effects: Iterable[Present]) -> CellModel:
+        """The same cell with these effects in place of its own."""
+        return replace(self, effects=tuple(effects))
+
+
+def kinematics_of(views: Views) -> ArmKinematics | None:
+    """The kinematics of the logged arm, or None where model or joints are unknown."""
+    if views.robot_model is None or not np.isfinite(views.joints_rad).any():
+        return None
+    return arm(views.robot_model)
+
+
+def start(model: CellModel, views: Views, kinematics: ArmKinematics | None) -> Walk:
+    """The walk before its first link: everything as logged and nominal."""
+    n = len(views)
+    points = views.board.corners_m
+    if model.corner_offsets_m is not None:
+        points = points + model.corner_offsets_m
+    return Walk(
+        views=views,
+        arm=kinematics,
+        joints_rad=views.joints_rad,
+        base_from_flange=views.base_from_flange,
+        flange_from_mounted=np.repeat(model.flange_from_mounted[None], n, axis=0),
+        base_from_fixed=np.repeat(model.base_from_fixed[None], n, axis=0),
+        points_m=points.copy(),
+        optics=np.repeat(model.optics[None], n, axis=0),
+    )
+
+
+def _act(walk: Walk, model: CellModel, links: tuple[Link, ...]) -> None:
+    for link in links:
+        for present in model.effects:
+            if present.effect.link == link:
+                present.effect.act(present.values, walk)
+
+
+def walk(
+    model: CellModel,
+    views: Views,
+    *,
+    kinematics: ArmKinematics | None = None,
+    flange_error: FloatArray | None = None,
+) -> Walk:
+    """Walk the chain for every logged frame.
+
+    Parameters
+    ----------
+    model, views:
+        The cell, and the log (corners are not looked at).
+    kinematics:
+        The arm; looked up from the log where it is not given.
+    flange_error:
+        (N, 6) small increment of the flange in its own frame, metres and radians: the robot's
+        repeatability, or an estimate of it.
+
+    Returns
+    -------
+    The walk with `optics`, `camera_from_board` and `points_m` as the sensor sees them.
+    """
+    state = start(model, views, kinematics or kinematics_of(views))
+    _act(state, model, LINKS[:2])
+    state.move_arm()
+    if flange_error is not None:
+        state.base_from_flange = state.base_from_flange @ rigid.from_vector(flange_error)
+    _act(state, model, LINKS[2:4])
+    state.place()
+    _act(state, model, LINKS[4:])
+    return state
+
+
+def predict(
+    model: CellModel, views: Views, *, flange_error: FloatArray | None = None
+) -> FloatArray:
+    """(N, M, 2) pixels at which this cell shows the corners at the logged poses."""
+    state = walk(model, views, flange_error=flange_error)
+    return project(state.optics, state.camera_from_board, state.points_m)

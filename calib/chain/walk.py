@@ -1,0 +1,123 @@
+"""The state that passes from link to link: where everything is while each frame is exposed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calib.chain import rigid
+from calib.chain.kinematics import ArmKinematics
+from calib.chain.optics import COLUMN
+from calib.views import FloatArray, Views
+
+DOWN_IN_BASE = np.array([0.0, 0.0, -1.0])
+"""Gravity's direction in the robot base: the base is taken to stand upright."""
+
+
+@dataclass
+class Walk:
+    """What the links have said so far about N frames.
+
+    Attributes
+    ----------
+    views:
+        The log, read only.
+    arm:
+        The arm's kinematics, or None where the model is unknown.
+    joints_rad:
+        (N, J) where the joints truly are; clock and arm effects move them.
+    dh_offset:
+        (J, 4) corrections of the Denavit-Hartenberg rows, or None.
+    base_from_flange:
+        (N, 4, 4) where the flange truly is.
+    flange_from_mounted, base_from_fixed:
+        (N, 4, 4) the camera and the board for an eye in hand, the board and the camera else.
+    points_m:
+        (M, 3) the board's corners as they are.
+    optics:
+        (N, K) the lens and the sensor in each frame.
+    """
+
+    views: Views
+    arm: ArmKinematics | None
+    joints_rad: FloatArray
+    base_from_flange: FloatArray
+    flange_from_mounted: FloatArray
+    base_from_fixed: FloatArray
+    points_m: FloatArray
+    optics: FloatArray
+    dh_offset: FloatArray | None = None
+    camera_from_board: FloatArray = field(default_factory=lambda: np.empty((0, 4, 4)))
+
+    @property
+    def in_hand(self) -> bool:
+        """True when the camera rides on the flange."""
+        return self.views.mount == "eye_in_hand"
+
+    def column(self, name: str) -> FloatArray:
+        """Return a writable (N,) view of one optics column."""
+        return self.optics[:, COLUMN[name]]
+
+    @property
+    def base_from_camera(self) -> FloatArray:
+        """(N, 4, 4), valid from the mount link on."""
+        if self.in_hand:
+            return self.base_from_flange @ self.flange_from_mounted
+        return self.base_from_fixed
+
+    @property
+    def base_from_board(self) -> FloatArray:
+        """(N, 4, 4), valid from the board link on."""
+        if self.in_hand:
+            return self.base_from_fixed
+        return self.base_from_flange @ self.flange_from_mounted
+
+    def gravity_in_camera(self) -> FloatArray:
+        """(N, 3) unit vectors of gravity as the camera feels it."""
+        rotation = self.base_from_camera[:, :3, :3]
+        return np.asarray(np.einsum("nji,j->ni", rotation, DOWN_IN_BASE))
+
+    @property
+    def distance_m(self) -> FloatArray:
+        """(N,) depth of the board's centre along the optical axis; what the lens focuses on."""
+        centre = self.points_m.mean(axis=0)
+        pose = self.camera_from_board
+        return np.asarray(pose[:, 2, :3] @ centre + pose[:, 2, 3])
+
+    def move_arm(self) -> None:
+        """Bring the flange to where the moved joints and links put it.
+
+        The logged pose is corrected by the difference that the effects make in the nominal
+        kinematics, so that a controller's own factory calibration stays in it.
+        """
+        logged = self.views.joints_rad
+        unmoved = self.joints_rad is logged or np.array_equal(self.joints_rad, logged)
+        if self.arm is None or (self.dh_offset is None and unmoved):
+            return
+        nominal = self.arm.forward(logged)
+        true = self.arm.forward(self.joints_rad, self.dh_offset)
+        moved = self.base_from_flange @ rigid.inverse(nominal) @ true
+        known = np.isfinite(moved).all(axis=(1, 2), keepdims=True)
+        self.base_from_flange = np.where(known, moved, self.base_from_flange)
+
+    def place(self) -> None:
+        """Work out where the camera sees the board."""
+        self.camera_from_board = rigid.inverse(self.base_from_camera) @ self.base_from_board
+
+    def board_sweep(self, duration_s: float) -> FloatArray:
+        """(N, 6) increment by which the board moves in the camera's frame during `duration_s`."""
+        if self.arm is None:
+            return np.zeros((len(self.views), 6))
+        speed = np.nan_to_num(self.views.joint_velocity_rad_s)
+        joints = self.joints_rad
+        now = self.arm.forward(joints)
+        later = self.arm.forward(joints + speed * duration_s)
+        flange_step = rigid.inverse(now) @ later
+        if self.in_hand:
+            mounted = self.flange_from_mounted
+            camera_step = rigid.inverse(mounted) @ flange_step @ mounted
+            return np.nan_to_num(rigid.to_vector(rigid.inverse(camera_step)))
+        camera_from_flange = rigid.inverse(self.base_from_fixed) @ self.base_from_flange
+        step = camera_from_flange @ flange_step @ rigid.inverse(camera_from_flange)
+        return np.nan_to_num(rigid.to_vector(step))
