@@ -73,7 +73,7 @@ def read_mapping(path: Path) -> CommentedMap:
 def check_schema(path: Path, data: CommentedMap, schema: str) -> None:
     """Refuse a file of another kind or from a newer version of this program."""
     found = data.get("schema")
-    line, column = _position(data, ("schema",))
+    line, column = position_of(data, ("schema",))
     where = f"{path}:{line}:{column}: schema"
     if found is None:
         raise InputError(f"{path}:1:1: schema: is missing; the first line must be `{schema}`")
@@ -112,7 +112,7 @@ def _yaml_fault(path: Path, broken: YAMLError) -> str:
 
 def _error_line(path: Path, data: CommentedMap, error: ErrorDetails, known: list[str]) -> str:
     location = _real_location(data, error["loc"])
-    line, column = _position(data, location)
+    line, column = position_of(data, location)
     name = ".".join(str(part) for part in location) or "(whole file)"
     return f"{path}:{line}:{column}: {name}: {_message(error, known)}"
 
@@ -143,7 +143,7 @@ def _real_location(data: Any, location: Location) -> Location:
     return tuple(real)
 
 
-def _position(data: Any, location: Location) -> tuple[int, int]:
+def position_of(data: Any, location: Location) -> tuple[int, int]:
     """One-based line and column of a key, or of the nearest enclosing one that exists."""
     line, column = data.lc.line, data.lc.col
     for part in location:

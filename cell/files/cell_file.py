@@ -1,0 +1,200 @@
+"""`cell.yaml`: the arm, the camera, the board, where things stand, and what the truth is.
+
+The section `simulation` holds the truth of a simulated cell and is looked at by a dry run only;
+`layout` is what a tape measure gives, good enough to plan poses and to refuse unsafe ones.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import ConfigDict, Field, PositiveInt
+
+from calib.views import Mount
+from cell.files.parts import Box, Finite, Joints, Part, Pose, Positive
+from cell.files.yaml_model import read_model
+from cell.recording.header import Charuco, Chessboard
+
+SCHEMA: Final = "cell.cell/1"
+
+
+class CellChessboard(Chessboard):
+    """A chessboard; a key it does not know is an error."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class CellCharuco(Charuco):
+    """A ChArUco board; a key it does not know is an error."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+BoardFile = Annotated[CellChessboard | CellCharuco, Field(discriminator="type")]
+
+
+class SimulatedRobot(Part):
+    """An arm in this process."""
+
+    driver: Literal["sim"] = "sim"
+    model: str
+    """Kinematic model: ur3, ur3e, ur5, ur5e, ur10, ur10e, ur16e, irb140."""
+    payload_kg: float = Field(default=0.0, ge=0)
+    """Mass of camera and bracket at the flange."""
+
+
+class UniversalRobot(SimulatedRobot):
+    """A Universal Robots controller, e-Series or CB3."""
+
+    driver: Literal["ur"]  # type: ignore[assignment]
+    address: str
+    """Name or IP address of the controller."""
+
+
+class AbbRobot(SimulatedRobot):
+    """An ABB IRC5 controller with Robot Web Services."""
+
+    driver: Literal["abb"]  # type: ignore[assignment]
+    address: str
+    """Name or IP address of the controller, with `:port` where it is not 80."""
+    user: str = "Default User"
+    password: str = "robotics"
+    """The controller's factory default; give your own where it was changed."""
+
+
+RobotFile = Annotated[SimulatedRobot | UniversalRobot | AbbRobot, Field(discriminator="driver")]
+
+
+class Lens(Part):
+    """The lens, as its barrel says."""
+
+    focal_length_mm: Positive
+    f_number: Positive = 4.0
+
+
+class SimulatedCamera(Part):
+    """A camera in this process, and what all cameras have in common."""
+
+    driver: Literal["sim"] = "sim"
+    model: str | None = None
+    width: PositiveInt
+    height: PositiveInt
+    pixel_size_um: Positive | None = None
+    focus: Literal["auto", "manual", "motorised", "fixed"] | None = None
+    lens: Lens | None = None
+
+
+class GigeCamera(SimulatedCamera):
+    """A GigE Vision camera, through Aravis."""
+
+    driver: Literal["gige"]  # type: ignore[assignment]
+    address: str
+    """IP address of the camera."""
+    pixel_format: str = "Mono8"
+    features: dict[str, str | float | int | bool] = Field(default_factory=dict)
+    """GenICam features to set once at start, by name."""
+
+
+class GenicamCamera(SimulatedCamera):
+    """A camera behind a GenTL producer (CoaXPress grabbers), through harvesters."""
+
+    driver: Literal["genicam"]  # type: ignore[assignment]
+    producer: Path
+    """The vendor's .cti file."""
+    serial: str | None = None
+    """Serial number; the first camera found where it is not given."""
+    pixel_format: str = "Mono8"
+    features: dict[str, str | float | int | bool] = Field(default_factory=dict)
+    """GenICam features to set once at start, by name."""
+
+
+class RobotiqCamera(SimulatedCamera):
+    """A Robotiq wrist camera, over HTTP."""
+
+    driver: Literal["robotiq"]  # type: ignore[assignment]
+    address: str
+    """The robot's address, with `:port` where it is not 4242."""
+
+
+CameraFile = Annotated[
+    SimulatedCamera | GigeCamera | GenicamCamera | RobotiqCamera, Field(discriminator="driver")
+]
+
+
+class Layout(Part):
+    """Where things stand, to a centimetre or two: for planning and for refusing unsafe moves."""
+
+    mounted: Pose
+    """flange_from_camera (eye in hand) or flange_from_board (eye to hand)."""
+    fixed: Pose
+    """base_from_board (eye in hand) or base_from_camera (eye to hand)."""
+    home_deg: Joints
+    """Joint angles to start from and to plan around."""
+    distances_m: tuple[Positive, Positive]
+    """Nearest and farthest distance of the board's centre from the camera worth planning."""
+
+
+class EffectFile(Part):
+    """One effect by its name in the catalogue, with its values."""
+
+    name: str
+    law: str | None = None
+    parameters: dict[str, Finite] = Field(default_factory=dict)
+
+
+class Noise(Part):
+    """What scatters in the simulated cell; all are one-sigma."""
+
+    corner_px: float = Field(default=0.0, ge=0)
+    """Of detected corners, where corners are made without pictures."""
+    arm_position_m: float = Field(default=0.0, ge=0)
+    """Repeatability of the flange's position, per axis."""
+    arm_rotation_rad: float = Field(default=0.0, ge=0)
+    """Repeatability of the flange's rotation, per axis."""
+    read_levels: float = Field(default=0.0, ge=0)
+    """The sensor's read noise, in levels of an 8-bit image."""
+    full_well_electrons: Positive | None = None
+    """Photons are counted in these; without it there is no photon noise."""
+
+
+class Simulation(Part):
+    """The truth of a simulated cell."""
+
+    mounted: Pose
+    """As in `layout`, exactly."""
+    fixed: Pose
+    """As in `layout`, exactly."""
+    optics: dict[str, Finite]
+    """Columns of the chain's optics: alpha_px, beta_px, u0_px, v0_px, k1, k2, ..."""
+    effects: tuple[EffectFile, ...] = ()
+    """What a plain model leaves out."""
+    noise: Noise = Noise()
+    seed: int = 0
+
+
+class CellFile(Part):
+    """The whole of a cell file."""
+
+    schema_: Literal["cell.cell/1"] = Field(default=SCHEMA, alias="schema")
+    name: str
+    robot: RobotFile
+    camera: CameraFile
+    board: BoardFile
+    mount: Mount = "eye_in_hand"
+    layout: Layout | None = None
+    workspace: Box | None = None
+    """The arm's links and the camera stay inside this box."""
+    keep_out: tuple[Box, ...] = ()
+    """They stay out of these."""
+    simulation: Simulation | None = None
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Plain dicts and lists, keys as in the file, defaults left out."""
+        data = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+        return {"schema": SCHEMA, **data}
+
+
+def read_cell(path: Path) -> CellFile:
+    """Read a cell file; raises `InputError` with every error in it."""
+    return read_model(path, CellFile, schema=SCHEMA)

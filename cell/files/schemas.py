@@ -1,0 +1,34 @@
+"""The published JSON schemas of plan and cell files, for editors and other programs.
+
+``python -m cell.files.schemas`` writes them anew; a test keeps them in step with the models.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from cell.files.cell_file import CellFile
+from cell.files.plan_file import PlanFile
+
+FOLDER = Path(__file__).parents[1] / "schemas"
+MODELS: dict[str, type[BaseModel]] = {"cell.schema.json": CellFile, "plan.schema.json": PlanFile}
+
+
+def schema_text(model: type[BaseModel]) -> str:
+    """The JSON schema of a file's model, as published."""
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    return json.dumps(schema | model.model_json_schema(by_alias=True), indent=2) + "\n"
+
+
+def write_all() -> None:
+    """Write every schema into `cell/schemas/`."""
+    FOLDER.mkdir(exist_ok=True)
+    for name, model in MODELS.items():
+        (FOLDER / name).write_text(schema_text(model), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_all()
