@@ -1,0 +1,1 @@
+"""Maximum likelihood along the chain: per-frame poses eliminated, noise levels estimated."""

@@ -1,0 +1,128 @@
+"""Per-frame unknowns eliminated: what is left are the shared ones.
+
+Each frame contributes normal equations in six of its own numbers and the p shared ones; the
+Schur complement takes the six out (Triggs et al. 2000, Bundle adjustment, section 6.1). With a
+prior on the six this is the marginal likelihood of a linear mixed model: a noisy robot pose is
+nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from calib.views import FloatArray
+
+
+@dataclass(frozen=True)
+class FrameEquations:
+    """Normal equations of N frames in their own 6 numbers, p shared ones and the residual.
+
+    Attributes
+    ----------
+    own, own_shared, own_residual:
+        (N, 6, 6), (N, 6, p), (N, 6).
+    shared, shared_residual:
+        (p, p) and (p,), summed over the frames.
+    square_sum:
+        Weighted sum of squared residuals.
+    """
+
+    own: FloatArray
+    own_shared: FloatArray
+    own_residual: FloatArray
+    shared: FloatArray
+    shared_residual: FloatArray
+    square_sum: float
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Shared equations with the frames' own numbers eliminated.
+
+    Attributes
+    ----------
+    shared, shared_residual, square_sum:
+        (p, p), (p,) and the square sum that remains at shared increments of zero.
+    log_det_own:
+        Sum over frames of the log-determinants of the eliminated blocks.
+    back, at_zero:
+        (N, 6, p) and (N, 6): own = at_zero - back @ shared.
+    own_covariance:
+        (N, 6, 6) inverse of the eliminated blocks.
+    """
+
+    shared: FloatArray
+    shared_residual: FloatArray
+    square_sum: float
+    log_det_own: float
+    back: FloatArray
+    at_zero: FloatArray
+    own_covariance: FloatArray
+
+
+def eliminate(equations: FrameEquations, prior: FloatArray, damping: float = 0.0) -> Reduced:
+    """Take the frames' own numbers out.
+
+    Parameters
+    ----------
+    equations:
+        See `FrameEquations`.
+    prior:
+        (6, 6) or (N, 6, 6) information of the own numbers, added to their blocks.
+    damping:
+        Levenberg-Marquardt factor on the own blocks' diagonals.
+    """
+    own = equations.own + prior
+    if damping:
+        own = own + damping * own * np.eye(6)
+    scale = 1.0 / np.sqrt(np.maximum(np.einsum("nii->ni", own), 1e-300))
+    normal = own * scale[:, :, None] * scale[:, None, :]
+    covariance = np.linalg.inv(normal) * scale[:, :, None] * scale[:, None, :]
+    back = covariance @ equations.own_shared
+    at_zero = np.einsum("nij,nj->ni", covariance, equations.own_residual)
+    gathered = equations.own_shared.reshape(-1, equations.own_shared.shape[2])
+    p = gathered.shape[1]
+    shared = equations.shared - gathered.T @ back.reshape(-1, p)
+    shared_residual = equations.shared_residual - gathered.T @ at_zero.reshape(-1)
+    sign, log_det = np.linalg.slogdet(normal)
+    return Reduced(
+        shared=0.5 * (shared + shared.T),
+        shared_residual=shared_residual,
+        square_sum=equations.square_sum - float(np.sum(equations.own_residual * at_zero)),
+        log_det_own=float(np.sum(log_det - 2.0 * np.log(scale).sum(axis=1))),
+        back=back,
+        at_zero=at_zero,
+        own_covariance=covariance,
+    )
+
+
+def solve_scaled(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Solve a positive definite system after scaling its diagonal to one.
+
+    Returns
+    -------
+    The solution, the inverse of the matrix, and its log-determinant. Directions that the data do
+    not determine (relative eigenvalue below 1e-13) are left where they are.
+    """
+    diagonal = np.diag(matrix).copy()
+    scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 0.0)
+    normal = matrix * scale[:, None] * scale[None, :]
+    try:
+        factor = cho_factor(normal, lower=True)
+        if np.diag(factor[0]).min() > 1e-6:
+            inverse = cho_solve(factor, np.eye(len(normal)))
+            log_det = 2.0 * float(np.sum(np.log(np.diag(factor[0]))) - np.sum(np.log(scale)))
+            inverse = inverse * scale[:, None] * scale[None, :]
+            return inverse @ right, inverse, log_det
+    except np.linalg.LinAlgError:
+        pass
+    eigenvalue, vector = np.linalg.eigh(normal)
+    kept = eigenvalue > 1e-13 * max(float(eigenvalue[-1]), 1e-300)
+    root = (vector[:, kept] / np.sqrt(eigenvalue[kept])) * scale[:, None]
+    inverse = root @ root.T
+    log_det = float(np.sum(np.log(eigenvalue[kept])))
+    log_det -= 2.0 * float(np.sum(np.log(scale[scale > 0.0])))
+    return inverse @ right, inverse, log_det

@@ -1,0 +1,151 @@
+"""Which numbers of a cell are free, and how the frames follow them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.chain import rigid
+from calib.chain.effect import Effect, Present
+from calib.chain.kinematics import ArmKinematics
+from calib.chain.model import CellModel, walk
+from calib.chain.optics import COLUMN
+from calib.chain.walk import Walk
+from calib.views import FloatArray, Views
+
+_STEP_SHARE = 1e-4
+_OPTICS_TYPICAL = {"alpha_px": 10.0, "beta_px": 10.0, "u0_px": 10.0, "v0_px": 10.0, "skew_px": 5.0}
+PLAIN_OPTICS = ("alpha_px", "beta_px", "u0_px", "v0_px", "k1", "k2")
+"""What the plain model frees: one focal length a side, principal point, two radial terms."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One free number: where it stands, its usual size, and its unit."""
+
+    name: str
+    unit: str
+    typical: float
+    place: tuple[str, int, int]
+
+
+def _free_of(effect: Effect, at: int) -> list[Unknown]:
+    return [
+        Unknown(f"{effect.label}.{p.name}", p.unit, p.typical, ("effect", at, k))
+        for k, p in enumerate(effect.parameters)
+        if p.role != "setting" and p.identifiable
+    ]
+
+
+def unknowns_of(
+    model: CellModel, optics: tuple[str, ...] = PLAIN_OPTICS, *, poses: bool = True
+) -> tuple[Unknown, ...]:
+    """Every free number of a cell: optics columns, the two transforms, its effects."""
+    free = [Unknown(c, "", _OPTICS_TYPICAL.get(c, 0.01), ("optics", COLUMN[c], 0)) for c in optics]
+    if poses:
+        for frame in ("flange_from_mounted", "base_from_fixed"):
+            for k in range(6):
+                unit = "m" if k < 3 else "rad"
+                axis = "xyz"[k % 3] if k < 3 else "r" + "xyz"[k % 3]
+                free.append(Unknown(f"{frame}.{axis}", unit, 1e-2, (frame, k, 0)))
+    for at, present in enumerate(model.effects):
+        free += _free_of(present.effect, at)
+    return tuple(free)
+
+
+def moved(model: CellModel, unknowns: tuple[Unknown, ...], step: FloatArray) -> CellModel:
+    """The cell after adding (p,) `step` to its free numbers; transforms move on their own side."""
+    optics = model.optics.copy()
+    values = [present.values.copy() for present in model.effects]
+    increments = {"flange_from_mounted": np.zeros(6), "base_from_fixed": np.zeros(6)}
+    for unknown, amount in zip(unknowns, step, strict=True):
+        kind, at, k = unknown.place
+        if kind == "optics":
+            optics[at] += amount
+        elif kind == "effect":
+            parameter = model.effects[at].effect.parameters[k]
+            values[at][k] = np.clip(values[at][k] + amount, parameter.low, parameter.high)
+        else:
+            increments[kind][at] += amount
+    return replace(
+        model,
+        optics=optics,
+        flange_from_mounted=model.flange_from_mounted
+        @ rigid.from_vector(increments["flange_from_mounted"]),
+        base_from_fixed=model.base_from_fixed @ rigid.from_vector(increments["base_from_fixed"]),
+        effects=tuple(
+            Present(present.effect, v) for present, v in zip(model.effects, values, strict=True)
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How each frame's own quantities follow the p free numbers, to first order.
+
+    Attributes
+    ----------
+    state:
+        The walk at the present values.
+    active:
+        Indices of the A optics columns that follow anything.
+    modes:
+        (B, M, 3) movements of the board's corners.
+    local:
+        (N, A + 6 + B, p).
+    flange:
+        (N, 6, 6) how the pose in the camera follows a small error of the flange in its own frame.
+    """
+
+    state: Walk
+    active: tuple[int, ...]
+    modes: FloatArray
+    local: FloatArray
+    flange: FloatArray
+
+
+def flange_to_pose(state: Walk) -> FloatArray:
+    """(N, 6, 6) increment of camera_from_board for a small increment of the flange."""
+    if state.in_hand:
+        return -rigid.adjoint(rigid.inverse(state.flange_from_mounted))
+    return rigid.adjoint(rigid.inverse(state.base_from_fixed) @ state.base_from_flange)
+
+
+def dependence(
+    model: CellModel,
+    views: Views,
+    unknowns: tuple[Unknown, ...],
+    *,
+    kinematics: ArmKinematics | None,
+    flange_error: FloatArray | None,
+) -> Dependence:
+    """Differentiate the walk by every free number (central differences, one walk a side)."""
+
+    def run(cell: CellModel) -> Walk:
+        return walk(cell, views, kinematics=kinematics, flange_error=flange_error)
+
+    state = run(model)
+    n, p = len(views), len(unknowns)
+    d_optics = np.zeros((n, state.optics.shape[1], p))
+    d_pose = np.zeros((n, 6, p))
+    d_points = np.zeros((p, *state.points_m.shape))
+    back = rigid.inverse(state.camera_from_board)
+    for k, unknown in enumerate(unknowns):
+        step = np.zeros(p)
+        step[k] = unknown.typical * _STEP_SHARE
+        plus, minus = run(moved(model, unknowns, step)), run(moved(model, unknowns, -step))
+        width = 2.0 * step[k]
+        d_optics[:, :, k] = (plus.optics - minus.optics) / width
+        d_points[k] = (plus.points_m - minus.points_m) / width
+        ahead = rigid.to_vector(plus.camera_from_board @ back)
+        behind = rigid.to_vector(minus.camera_from_board @ back)
+        d_pose[:, :, k] = (ahead - behind) / width
+    active = tuple(int(c) for c in np.flatnonzero(np.abs(d_optics).max(axis=(0, 2)) > 0.0))
+    moving = np.flatnonzero(np.abs(d_points).max(axis=(1, 2)) > 0.0)
+    local = np.zeros((n, len(active) + 6 + len(moving), p))
+    local[:, : len(active)] = d_optics[:, active]
+    local[:, len(active) : len(active) + 6] = d_pose
+    for b, k in enumerate(moving):
+        local[:, len(active) + 6 + b, k] = 1.0
+    return Dependence(state, active, d_points[moving], local, flange_to_pose(state))
