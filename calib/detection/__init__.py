@@ -1,0 +1,36 @@
+"""Finds a calibration board's corners in pictures, to a hundredth of a pixel and better."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.detection.finder import find_chessboard
+from calib.detection.result import Detection, Rejected
+from calib.views import Board
+
+__all__ = ["Detection", "Rejected", "detect"]
+
+
+def detect(image: NDArray[Any], board: Board) -> Detection | Rejected:
+    """Find `board` in a picture and measure its corners.
+
+    Parameters
+    ----------
+    image:
+        (h, w) grey or (h, w, 3) colour (the mean of the channels is taken), any integer or
+        float type.
+    board:
+        The board to look for.
+
+    Returns
+    -------
+    The detection, or a `Rejected` with the reason; the latter is false as a condition.
+    """
+    grey = np.asarray(image)
+    if grey.ndim == 3:
+        grey = grey.mean(axis=2, dtype=np.float32)
+    limit = np.iinfo(image.dtype).max if np.issubdtype(image.dtype, np.integer) else np.inf
+    return find_chessboard(np.ascontiguousarray(grey, dtype=np.float32), board, float(limit))

@@ -1,0 +1,144 @@
+"""Finds a chessboard in a picture: coarse levels first, then the fit on the full picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.detection.candidates import find_candidates
+from calib.detection.grid import Grid, in_board_order, place_board, with_predictions
+from calib.detection.lattice import grow_lattices
+from calib.detection.refine import Fitted, doubtful, fit_grid, starts
+from calib.detection.result import Detection, FloatArray, Rejected
+from calib.detection.saddle import CONTRAST, PIXEL_VARIANCE, WIDTH, X, Y
+from calib.views import Board
+
+FloatImage = NDArray[np.float32]
+
+_FIRST_LEVEL_PIXELS = 1.0e6
+_SMALLEST_SIDE_PX = 100
+_MOST_PIECES = 3
+
+
+def _scales(shape: tuple[int, ...]) -> list[float]:
+    """Image scales in the order in which they are tried."""
+    first = 0
+    while shape[0] * shape[1] * 0.25**first > _FIRST_LEVEL_PIXELS:
+        first += 1
+    coarser = [s for s in (first + 1, first + 2) if min(shape[:2]) * 0.5**s >= _SMALLEST_SIDE_PX]
+    return [0.5**s for s in (first, *coarser[:1], *range(first - 1, -1, -1), *coarser[1:])]
+
+
+def _scaled(image: FloatImage, scale: float) -> FloatImage:
+    if scale == 1.0:
+        return image
+    factor = round(1 / scale)
+    height, width = (side // factor for side in image.shape)
+    whole = image[: height * factor, : width * factor]
+    return np.asarray(
+        cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), dtype=np.float32
+    )
+
+
+def _enlarged(first: FloatArray, scale: float) -> FloatArray:
+    """Fit parameters of a smaller image, as starts on the full one."""
+    starts_full = first.copy()
+    starts_full[..., [X, Y]] = (first[..., [X, Y]] + 0.5) / scale - 0.5
+    blur2 = np.maximum(first[..., WIDTH] ** 2 - PIXEL_VARIANCE, 0.05) / scale**2
+    starts_full[..., WIDTH] = np.sqrt(blur2 + PIXEL_VARIANCE)
+    return starts_full
+
+
+def _complete(image: FloatImage, grid: Grid) -> Fitted | Rejected:
+    """The grid fitted on the level's image with its gaps filled, if every corner is there."""
+    filled = with_predictions(grid)
+    if not np.isfinite(filled.corners_px).all():
+        return Rejected("the corners found do not lie on a plane")
+    fitted = fit_grid(image, starts(image, filled.corners_px))
+    doubt = doubtful(fitted, filled.corners_px, grid.first_dark)
+    if doubt.any():
+        seen = int((~doubt).sum())
+        return Rejected(f"partial view: {seen} of {doubt.size} corners are there")
+    return fitted
+
+
+def _on_level(image: FloatImage, board: Board) -> tuple[Grid, Fitted] | Rejected:
+    reason = Rejected("no chessboard corners in the picture")
+    for lattice in grow_lattices(find_candidates(image))[:_MOST_PIECES]:
+        placed = place_board(lattice, board)
+        if isinstance(placed, Rejected):
+            reason = reason if "partial" in reason.reason else placed
+            continue
+        for grid in placed:
+            fitted = _complete(image, in_board_order(grid, board))
+            if isinstance(fitted, Fitted):
+                return in_board_order(grid, board), fitted
+            reason = fitted
+    return reason
+
+
+def _found(image: FloatImage, board: Board) -> Iterator[tuple[float, Grid, Fitted] | Rejected]:
+    for scale in _scales(image.shape):
+        found = _on_level(_scaled(image, scale), board)
+        yield found if isinstance(found, Rejected) else (scale, *found)
+
+
+def _saturated_share(image: FloatImage, fitted: Fitted, limit: float) -> float:
+    corners = fitted.corners_px
+    outline = np.array([corners[0, 0], corners[0, -1], corners[-1, -1], corners[-1, 0]])
+    low = np.clip(np.floor(outline.min(axis=0)).astype(int), 0, None)
+    high = np.ceil(outline.max(axis=0)).astype(int) + 1
+    part = image[low[1] : high[1], low[0] : high[0]]
+    mask = np.zeros(part.shape, np.uint8)
+    cv2.fillConvexPoly(mask, np.rint(outline - low).astype(np.int32), 1)
+    middle = float(np.median(fitted.parameters[..., CONTRAST + 1]))
+    bright = part[(mask > 0) & (part > middle)]
+    return float((bright >= limit).mean()) if bright.size else 0.0
+
+
+def _as_detection(fitted: Fitted, board: Board, saturated: float) -> Detection:
+    M = board.corner_count
+    covariance = fitted.covariance_px2.reshape(M, 2, 2)
+    return Detection(
+        corners_px=fitted.corners_px.reshape(M, 2),
+        covariance_px2=covariance,
+        sigma_px=np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2),
+        blur_px=fitted.blur_px.reshape(M),
+        contrast=2 * np.abs(fitted.parameters[..., CONTRAST]).reshape(M),
+        upside_down_known=(board.rows + board.cols) % 2 == 1,
+        saturated=saturated,
+    )
+
+
+def find_chessboard(image: FloatImage, board: Board, limit: float) -> Detection | Rejected:
+    """All inner corners of a chessboard, or why they were not found.
+
+    Parameters
+    ----------
+    image:
+        (h, w) grey levels.
+    board:
+        What to look for.
+    limit:
+        Grey level at which the sensor saturates.
+    """
+    best: Rejected | None = None
+    for found in _found(image, board):
+        if isinstance(found, Rejected):
+            best = found if best is None or "partial" in found.reason else best
+            continue
+        scale, grid, coarse = found
+        first = _enlarged(coarse.parameters, scale)
+        rough = fit_grid(image, first, iterations=4) if scale < 1.0 else coarse
+        fine = fit_grid(image, rough.parameters, bent=True)
+        doubt = doubtful(fine, first[..., [X, Y]], grid.first_dark)
+        if doubt.any():
+            best = Rejected(
+                f"{int(doubt.sum())} of {doubt.size} corners are unclear when looked at closely"
+            )
+            continue
+        return _as_detection(fine, board, _saturated_share(image, fine, limit))
+    return best or Rejected("the picture is too small")

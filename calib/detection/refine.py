@@ -1,0 +1,193 @@
+"""From a rough grid to maximum-likelihood corners: starts, windows and what is given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.detection.result import FloatArray
+from calib.detection.saddle import (
+    ANGLE_1,
+    CONTRAST,
+    MEAN,
+    PARAMETERS,
+    PIXEL_VARIANCE,
+    WIDTH,
+    X,
+    Y,
+    fit_corners,
+)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A grid's fitted corners.
+
+    Attributes
+    ----------
+    parameters:
+        (rows, cols, 7) as `saddle.fit_corners` returns them; contrast is half the step and
+        positive where the square between the directions of rows and columns is dark.
+    covariance_px2:
+        (rows, cols, 2, 2).
+    residual:
+        (rows, cols) standard deviation in grey levels; NaN where the fit broke down.
+    """
+
+    parameters: FloatArray
+    covariance_px2: FloatArray
+    residual: FloatArray
+
+    @property
+    def corners_px(self) -> FloatArray:
+        """(rows, cols, 2) positions."""
+        return self.parameters[..., [X, Y]]
+
+    @property
+    def blur_px(self) -> FloatArray:
+        """(rows, cols) Gaussian blur without the pixel's own."""
+        width = self.parameters[..., WIDTH]
+        return np.asarray(np.sqrt(np.maximum(width**2 - PIXEL_VARIANCE, 0)))
+
+
+def lattice_steps(corners_px: FloatArray) -> FloatArray:
+    """(rows, cols, 4) image step of one column (2) and of one row (2) at each corner."""
+    along_cols = np.gradient(corners_px, axis=1)
+    along_rows = np.gradient(corners_px, axis=0)
+    return np.concatenate([along_cols, along_rows], axis=-1)
+
+
+def _shortest_step(steps: FloatArray) -> FloatArray:
+    sides = np.linalg.norm(steps.reshape(*steps.shape[:-1], 2, 2), axis=-1)
+    return np.asarray(sides.min(axis=-1))
+
+
+def _sampled(image: NDArray[np.float32], xy: FloatArray) -> FloatArray:
+    x = np.clip(np.rint(xy[..., 0]).astype(int), 0, image.shape[1] - 1)
+    y = np.clip(np.rint(xy[..., 1]).astype(int), 0, image.shape[0] - 1)
+    return np.asarray(image[y, x], dtype=np.float64)
+
+
+def starts(image: NDArray[np.float32], corners_px: FloatArray) -> FloatArray:
+    """(rows, cols, 7) first guesses: edges along the lattice, levels from the squares' middles."""
+    steps = lattice_steps(corners_px)
+    across, down = steps[..., :2], steps[..., 2:]
+    quarters = [
+        (a, b, _sampled(image, corners_px + 0.35 * (a * across + b * down)))
+        for a in (-1, 1)
+        for b in (-1, 1)
+    ]
+    guess = np.empty((*corners_px.shape[:2], PARAMETERS))
+    guess[..., [X, Y]] = corners_px
+    guess[..., ANGLE_1] = np.arctan2(across[..., 1], across[..., 0])
+    guess[..., ANGLE_1 + 1] = np.arctan2(down[..., 1], down[..., 0])
+    guess[..., WIDTH] = np.maximum(0.06 * _shortest_step(steps), 0.8)
+    guess[..., MEAN] = sum(level for _, _, level in quarters) / 4
+    # d1 > 0 below edge 1 and d2 > 0 left of edge 2: their product is negative in square (+, +)
+    guess[..., CONTRAST] = -sum(a * b * level for a, b, level in quarters) / 4
+    return guess
+
+
+def _smoothed_gradient(values: FloatArray, steps: FloatArray) -> FloatArray:
+    """(rows, cols, 2) image gradient of a quantity known at the corners."""
+    by_col = np.gradient(values, axis=1)
+    by_row = np.gradient(values, axis=0)
+    det = steps[..., 0] * steps[..., 3] - steps[..., 1] * steps[..., 2]
+    gx = (by_col * steps[..., 3] - by_row * steps[..., 1]) / det
+    gy = (by_row * steps[..., 0] - by_col * steps[..., 2]) / det
+    return np.stack([_box3(gx), _box3(gy)], axis=-1)
+
+
+def _box3(values: FloatArray) -> FloatArray:
+    padded = np.pad(values, 1, mode="edge")
+    rows, cols = values.shape
+    return np.asarray(
+        sum(padded[i : i + rows, j : j + cols] for i in range(3) for j in range(3)) / 9
+    )
+
+
+def _curvature(corners_px: FloatArray, axis: int) -> FloatArray:
+    """(rows, cols) bend of the lattice line along `axis`, 1/pixel, positive towards its normal."""
+    line = np.moveaxis(corners_px, axis, 0)
+    step = np.gradient(line, axis=0)
+    bend = np.zeros_like(line)
+    if len(line) >= 3:
+        bend[1:-1] = line[2:] - 2 * line[1:-1] + line[:-2]
+        bend[0], bend[-1] = bend[1], bend[-2]
+    length = np.linalg.norm(step, axis=-1)
+    turning = (step[..., 0] * bend[..., 1] - step[..., 1] * bend[..., 0]) / length**3
+    return _box3(np.moveaxis(turning, 0, axis))
+
+
+def _shapes(fitted: FloatArray | None, steps: FloatArray) -> FloatArray:
+    """(rows, cols, 8) what `saddle.fit_corners` takes as given, from an earlier fit if any."""
+    shapes = np.zeros((*steps.shape[:2], 8))
+    det = np.abs(steps[..., 0] * steps[..., 3] - steps[..., 1] * steps[..., 2])
+    shapes[..., 6] = det / np.hypot(steps[..., 0], steps[..., 1])
+    shapes[..., 7] = det / np.hypot(steps[..., 2], steps[..., 3])
+    if fitted is not None:
+        sign = np.sign(fitted[..., CONTRAST])[..., None]
+        shapes[..., 0:2] = _smoothed_gradient(fitted[..., MEAN], steps)
+        shapes[..., 2:4] = sign * _smoothed_gradient(np.abs(fitted[..., CONTRAST]), steps)
+        shapes[..., 4] = _curvature(fitted[..., [X, Y]], axis=1)
+        shapes[..., 5] = _curvature(fitted[..., [X, Y]], axis=0)
+    return shapes
+
+
+def fit_grid(
+    image: NDArray[np.float32],
+    first: FloatArray,
+    *,
+    bent: bool = False,
+    reach: float = 0.4,
+    iterations: int = 12,
+) -> Fitted:
+    """Fit all corners of a grid from (rows, cols, 7) starts.
+
+    With `bent`, the starts are taken to be good enough to read from them the shading over the
+    board and the bend of its lines in the image, which the fit then takes as given.
+    """
+    rows, cols = first.shape[:2]
+    steps = lattice_steps(first[..., [X, Y]])
+    shapes = _shapes(first if bent else None, steps)
+    parameters, covariance, residual = fit_corners(
+        image,
+        first.reshape(-1, PARAMETERS),
+        steps.reshape(-1, 4),
+        shapes.reshape(-1, 8),
+        reach=reach,
+        iterations=iterations,
+    )
+    return Fitted(
+        parameters.reshape(rows, cols, PARAMETERS),
+        covariance.reshape(rows, cols, 2, 2),
+        residual.reshape(rows, cols),
+    )
+
+
+def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray[np.bool_]:
+    """(rows, cols) corners that are no crossing of the expected colours where expected.
+
+    Parameters
+    ----------
+    before_px:
+        (rows, cols, 2) where the corners were before the fit.
+    first_dark:
+        Whether the square outside corner (0, 0) is dark.
+    """
+    rows, cols = before_px.shape[:2]
+    steps = lattice_steps(before_px)
+    shortest = _shortest_step(steps)
+    moved = np.linalg.norm(fitted.corners_px - before_px, axis=-1)
+    even = np.add.outer(np.arange(rows), np.arange(cols)) % 2 == 0
+    contrast = fitted.parameters[..., CONTRAST] * np.where(even == first_dark, 1.0, -1.0)
+    typical = float(np.nanmedian(np.abs(contrast)))
+    fine = (
+        np.isfinite(fitted.residual)
+        & (moved < 0.3 * shortest)
+        & (contrast > 0.2 * typical)
+        & (fitted.residual < 0.5 * np.abs(contrast))
+    )
+    return np.asarray(~fine)
