@@ -87,7 +87,7 @@ def eliminate(equations: FrameEquations, prior: FloatArray, damping: float = 0.0
     p = gathered.shape[1]
     shared = equations.shared - gathered.T @ back.reshape(-1, p)
     shared_residual = equations.shared_residual - gathered.T @ at_zero.reshape(-1)
-    sign, log_det = np.linalg.slogdet(normal)
+    _, log_det = np.linalg.slogdet(normal)
     return Reduced(
         shared=0.5 * (shared + shared.T),
         shared_residual=shared_residual,

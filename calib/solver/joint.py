@@ -1,0 +1,318 @@
+"""One maximum-likelihood fit of everything, with the robot's poses as noisy observations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.chain import rigid
+from calib.chain.kinematics import ArmKinematics
+from calib.chain.model import CellModel, kinematics_of, walk
+from calib.chain.projection import project
+from calib.solver.accumulate import LocalEquations, local_equations
+from calib.solver.elimination import FrameEquations, solve_scaled
+from calib.solver.noise import JointEquations, Noise, Profile, estimate_noise, profile, scaled
+from calib.solver.unknowns import Dependence, Unknown, dependence, moved
+from calib.views import FloatArray, Views
+
+STUDENT_DOF = 5.0
+"""Degrees of freedom of the corners' t distribution: tails heavier than a Gauss curve's."""
+
+
+@dataclass(frozen=True)
+class JointState:
+    """Where the fit stands: the cell, each flange's error, and the noise."""
+
+    model: CellModel
+    flange_error: FloatArray
+    noise: Noise
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """The result of `fit_joint`.
+
+    Attributes
+    ----------
+    model, noise, flange_error:
+        The cell, the noise levels, and (N, 6) the flange's errors in its own frame.
+    unknowns, covariance:
+        The p free numbers and their (p, p) covariance.
+    residual_px:
+        (N, M, 2) observed minus predicted with the flange errors put in, NaN where not seen.
+    weight:
+        (N, M) what the t distribution made of each corner; one for a good one.
+    minus_two_log:
+        -2 log marginal likelihood (not restricted), to compare models of the same data.
+    profile, equations, dependence:
+        The linearised problem at the optimum, for tests of what is missing.
+    """
+
+    model: CellModel
+    noise: Noise
+    flange_error: FloatArray
+    unknowns: tuple[Unknown, ...]
+    covariance: FloatArray
+    residual_px: FloatArray
+    weight: FloatArray
+    minus_two_log: float
+    profile: Profile
+    equations: JointEquations
+    dependence: Dependence
+    converged: bool
+
+    @property
+    def parameters(self) -> int:
+        """How many numbers are free, without those that have a prior."""
+        return len(self.unknowns)
+
+    def sigma(self, name: str) -> float:
+        """One-sigma uncertainty of the free number of that name."""
+        at = [u.name for u in self.unknowns].index(name)
+        return float(np.sqrt(self.covariance[at, at]))
+
+
+def _corner_blocks(
+    found: Dependence, local: LocalEquations, equations: FrameEquations
+) -> FrameEquations:
+    """Append each corner's own in-plane shift to the shared numbers."""
+    assert local.cross is not None
+    assert local.own is not None
+    a, flange = len(found.active), found.flange
+    n, m = local.own.shape[:2]
+    cross = local.cross.reshape(n, 2 * m, -1)
+    p = found.local.shape[2]
+    own_corner = np.einsum("nqk,ncq->nkc", flange, cross[:, :, a : a + 6])
+    shared_corner = np.einsum("ncq,nqp->pc", cross[:, :, :-1], found.local, optimize=True)
+    shared = np.zeros((p + 2 * m, p + 2 * m))
+    shared[:p, :p] = equations.shared
+    shared[:p, p:] = shared_corner
+    shared[p:, :p] = shared_corner.T
+    blocks = local.own.sum(axis=0)
+    at = p + 2 * np.arange(m)
+    for i in range(2):
+        for j in range(2):
+            shared[at + i, at + j] = blocks[:, i, j]
+    return FrameEquations(
+        own=equations.own,
+        own_shared=np.concatenate([equations.own_shared, own_corner], axis=2),
+        own_residual=equations.own_residual,
+        shared=shared,
+        shared_residual=np.concatenate([equations.shared_residual, cross[:, :, -1].sum(axis=0)]),
+        square_sum=equations.square_sum,
+    )
+
+
+def assemble(
+    found: Dependence,
+    views: Views,
+    weight: FloatArray,
+    flange_error: FloatArray,
+    corner_shift: FloatArray | None,
+) -> tuple[JointEquations, FloatArray]:
+    """Normal equations in flange errors and shared numbers; and (N, M, 2) residuals."""
+    state = found.state
+    local = local_equations(
+        state.optics,
+        state.camera_from_board,
+        state.points_m,
+        views.corners_px,
+        weight,
+        found.active,
+        found.modes,
+        corners=corner_shift is not None,
+    )
+    a = len(found.active)
+    gram, flange, mapping = local.gram, found.flange, found.local
+    to_pose = gram[:, a : a + 6]
+    flange_t = np.swapaxes(flange, 1, 2)
+    mapped = gram[:, :-1, :-1] @ mapping
+    frames = FrameEquations(
+        own=flange_t @ to_pose[:, :, a : a + 6] @ flange,
+        own_shared=flange_t @ mapped[:, a : a + 6],
+        own_residual=(flange_t @ to_pose[:, :, -1:])[:, :, 0],
+        shared=np.einsum("nqi,nqj->ij", mapping, mapped, optimize=True),
+        shared_residual=np.einsum("nqi,nq->i", mapping, gram[:, :-1, -1]),
+        square_sum=float(gram[:, -1, -1].sum()),
+    )
+    if corner_shift is not None:
+        frames = _corner_blocks(found, local, frames)
+    equations = JointEquations(
+        frames=frames,
+        flange_error=flange_error,
+        corner_shift=np.zeros(0) if corner_shift is None else corner_shift,
+        corner_numbers=0 if corner_shift is None else len(corner_shift),
+        observations=2 * int((weight > 0.0).sum()),
+    )
+    return equations, local.residual_px
+
+
+def _student_weight(residual_px: FloatArray, sigma_px: float) -> FloatArray:
+    """(N, M) weights of a bivariate t distribution (Lange, Little, Taylor 1989), at most one."""
+    square = np.nansum(residual_px**2, axis=2) / sigma_px**2
+    weight = np.minimum((STUDENT_DOF + 2.0) / (STUDENT_DOF + square), 1.0)
+    return np.where(np.isfinite(residual_px).all(axis=2), weight, 0.0)
+
+
+class _Iteration:
+    """Levenberg-Marquardt on the joint problem; noise and weights follow now and then."""
+
+    def __init__(
+        self,
+        state: JointState,
+        views: Views,
+        unknowns: tuple[Unknown, ...],
+        arm: ArmKinematics | None,
+    ) -> None:
+        self.views, self.unknowns, self.arm = views, unknowns, arm
+        self.state = state
+        self.with_print = state.noise.print_m > 0.0
+        self.weight = views.seen.astype(np.float64)
+        self.damping = 1e-6
+        self.linearise()
+
+    def linearise(self) -> None:
+        self.found = dependence(
+            self.state.model,
+            self.views,
+            self.unknowns,
+            kinematics=self.arm,
+            flange_error=self.state.flange_error,
+        )
+        self.equations, self.residual = self._assemble(self.found, self.state)
+
+    def _assemble(self, found: Dependence, at: JointState) -> tuple[JointEquations, FloatArray]:
+        shift = _shift_of(at.model, self.views) if self.with_print else None
+        return assemble(found, self.views, self.weight, at.flange_error, shift)
+
+    def cost(self, at: JointState) -> float:
+        """Penalised square sum at that state, for the present weights."""
+        seen = walk(at.model, self.views, kinematics=self.arm, flange_error=at.flange_error)
+        pixels = project(seen.optics, seen.camera_from_board, seen.points_m)
+        square = np.nansum((self.views.corners_px - pixels) ** 2, axis=2)
+        cost = float(np.sum(self.weight * square)) / at.noise.corner_px**2
+        pull = at.flange_error @ at.noise.flange_information
+        cost += float(np.sum(pull * at.flange_error))
+        if self.with_print:
+            cost += float(np.sum(_shift_of(at.model, self.views) ** 2)) / at.noise.print_m**2
+        return cost
+
+    def step(self) -> bool:
+        """Take one step that lowers the cost; True when nothing is left to gain."""
+        noise = self.state.noise
+        before = self.cost(self.state)
+        while self.damping < 1e8:
+            trial = self._trial(noise)
+            after = self.cost(trial)
+            if after <= before * (1.0 + 1e-12):
+                self.state = trial
+                self.damping = max(self.damping * 0.1, 1e-10)
+                self.linearise()
+                return before - after < 1e-7 * before + 1e-4
+            self.damping = max(self.damping * 10.0, 1e-6)
+        return True
+
+    def _trial(self, noise: Noise) -> JointState:
+        reduced, _ = scaled(self.equations, noise, self.damping)
+        matrix = reduced.shared + self.damping * np.diag(np.diag(reduced.shared))
+        step, _, _ = solve_scaled(matrix, reduced.shared_residual)
+        own = reduced.at_zero - reduced.back @ step
+        p = len(self.unknowns)
+        model = moved(self.state.model, self.unknowns, step[:p])
+        if self.with_print:
+            model = _with_shift(model, self.views, step[p:])
+        error = rigid.to_vector(rigid.from_vector(self.state.flange_error) @ rigid.from_vector(own))
+        return replace(self.state, model=model, flange_error=error)
+
+    def refresh(self, *, noise: bool, robust: bool) -> None:
+        """Estimate the noise anew, and the corners' weights."""
+        if noise:
+            level, _ = estimate_noise(self.equations, self.state.noise)
+            self.state = replace(self.state, noise=level)
+        if robust:
+            self.weight = _student_weight(self.residual, self.state.noise.corner_px)
+            self.equations, self.residual = self._assemble(self.found, self.state)
+
+
+def _shift_of(model: CellModel, views: Views) -> FloatArray:
+    if model.corner_offsets_m is None:
+        return np.zeros(2 * views.board.corner_count)
+    return model.corner_offsets_m[:, :2].ravel()
+
+
+def _with_shift(model: CellModel, views: Views, step: FloatArray) -> CellModel:
+    offsets = np.zeros((views.board.corner_count, 3))
+    offsets[:, :2] = (_shift_of(model, views) + step).reshape(-1, 2)
+    return replace(model, corner_offsets_m=offsets)
+
+
+def fit_joint(
+    model: CellModel,
+    views: Views,
+    unknowns: tuple[Unknown, ...],
+    noise: Noise,
+    *,
+    flange_error: FloatArray | None = None,
+    rounds: int = 3,
+    fixed_noise: bool = False,
+    kinematics: ArmKinematics | None = None,
+) -> JointFit:
+    """Fit the free numbers of a cell, each flange's error, and the noise levels.
+
+    Parameters
+    ----------
+    model:
+        Start; its transforms must be roughly right (a hand-eye solution is).
+    views:
+        Frames that all have a logged pose and corners.
+    unknowns:
+        What is free, see `unknowns_of`.
+    noise:
+        Start of the noise levels; `print_m` above zero frees every corner within the board's
+        plane, with that prior.
+    rounds:
+        How often noise and weights are estimated anew.
+    fixed_noise:
+        Keep the noise levels as given.
+
+    Raises
+    ------
+    ValueError
+        When a frame has no pose.
+    """
+    if not views.has_pose.all():
+        raise ValueError("every frame of a joint fit needs base_from_flange")
+    error = np.zeros((len(views), 6)) if flange_error is None else flange_error
+    arm = kinematics or kinematics_of(views)
+    run = _Iteration(JointState(model, error, noise), views, unknowns, arm)
+    settled = False
+    for attempt in range(rounds):
+        settled = False
+        for _ in range(20):
+            settled = run.step()
+            if settled:
+                break
+        if attempt < rounds - 1 or not fixed_noise:
+            run.refresh(noise=not fixed_noise, robust=True)
+    run.step()
+    return _result(run, settled)
+
+
+def _result(run: _Iteration, settled: bool) -> JointFit:
+    found = profile(run.equations, run.state.noise, restricted=False)
+    p = len(run.unknowns)
+    return JointFit(
+        model=run.state.model,
+        noise=run.state.noise,
+        flange_error=run.state.flange_error,
+        unknowns=run.unknowns,
+        covariance=found.covariance[:p, :p],
+        residual_px=run.residual,
+        weight=run.weight,
+        minus_two_log=found.minus_two_log,
+        profile=found,
+        equations=run.equations,
+        dependence=run.found,
+        converged=settled,
+    )

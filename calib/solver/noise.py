@@ -1,0 +1,169 @@
+"""Noise levels of corners, robot and print, estimated from the data and never typed in.
+
+Three variance components of a linear mixed model: corner noise, the flange's scatter about the
+logged pose (translation and rotation), and the printed corners' scatter about their grid.
+Restricted maximum likelihood (Patterson, Thompson 1971) estimates them without the bias that the
+fitted parameters would bring in; plain maximum likelihood compares models that differ in their
+parameters (Pinheiro, Bates 2000, section 2.2.5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from calib.solver.elimination import FrameEquations, Reduced, eliminate, solve_scaled
+from calib.views import FloatArray
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One-sigma levels.
+
+    Attributes
+    ----------
+    corner_px:
+        Of a detected corner, per axis.
+    flange_m, flange_rad:
+        Of the flange about its logged pose, per axis, in the flange's own frame.
+    print_m:
+        Of a printed corner about its grid, per axis in the board's plane; zero: held to the grid.
+    """
+
+    corner_px: float
+    flange_m: float
+    flange_rad: float
+    print_m: float = 0.0
+
+    @property
+    def flange_information(self) -> FloatArray:
+        """(6, 6) inverse covariance of the flange's error."""
+        return np.diag([self.flange_m**-2.0] * 3 + [self.flange_rad**-2.0] * 3)
+
+
+LEAST = Noise(1e-4, 1e-7, 1e-7, 1e-7)
+MOST = Noise(50.0, 0.3, 1.0, 5e-3)
+
+
+@dataclass(frozen=True)
+class JointEquations:
+    """Normal equations of the joint problem at unit corner noise, without any prior.
+
+    Attributes
+    ----------
+    frames:
+        Equations in the flange's six numbers and the shared ones; the last `corner_numbers` of
+        the shared ones are shifts of single corners.
+    flange_error, corner_shift:
+        (N, 6) and (C,) where the unknowns with a prior stand now.
+    corner_numbers, observations:
+        C and the number of scalar observations.
+    """
+
+    frames: FrameEquations
+    flange_error: FloatArray
+    corner_shift: FloatArray
+    corner_numbers: int
+    observations: int
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The joint problem at given noise levels with everything but the noise solved for.
+
+    Attributes
+    ----------
+    step, covariance:
+        (p + C,) and its (p + C, p + C) covariance.
+    reduced:
+        The eliminated equations.
+    minus_two_log:
+        -2 log of the marginal likelihood; restricted where asked for.
+    square_sum:
+        What the quadratic form keeps at its minimum, in units of the noise.
+    """
+
+    step: FloatArray
+    covariance: FloatArray
+    reduced: Reduced
+    minus_two_log: float
+    square_sum: float
+
+
+def scaled(
+    equations: JointEquations, noise: Noise, damping: float = 0.0
+) -> tuple[Reduced, FloatArray]:
+    """Equations with noise levels and priors put in, frames eliminated; and the shared prior."""
+    frames, information = equations.frames, noise.corner_px**-2.0
+    prior = noise.flange_information
+    p_all = len(frames.shared_residual)
+    shared_prior = np.zeros(p_all)
+    c = equations.corner_numbers
+    if c:
+        shared_prior[-c:] = noise.print_m**-2.0
+    pull = equations.flange_error @ prior
+    shared_pull = np.zeros(p_all)
+    if c:
+        shared_pull[-c:] = shared_prior[-c:] * equations.corner_shift
+    square = float(np.sum(equations.flange_error * pull))
+    if c:
+        square += float(shared_pull[-c:] @ equations.corner_shift)
+    weighted = FrameEquations(
+        own=frames.own * information,
+        own_shared=frames.own_shared * information,
+        own_residual=frames.own_residual * information - pull,
+        shared=frames.shared * information + np.diag(shared_prior),
+        shared_residual=frames.shared_residual * information - shared_pull,
+        square_sum=frames.square_sum * information + square,
+    )
+    return eliminate(weighted, prior, damping), shared_prior
+
+
+def profile(equations: JointEquations, noise: Noise, *, restricted: bool = True) -> Profile:
+    """Solve the joint problem at these noise levels and say how likely the data then are."""
+    reduced, _ = scaled(equations, noise)
+    step, covariance, log_det = solve_scaled(reduced.shared, reduced.shared_residual)
+    square_sum = reduced.square_sum - float(step @ reduced.shared_residual)
+    c, n = equations.corner_numbers, len(equations.flange_error)
+    minus_two_log = (
+        equations.observations * 2.0 * np.log(noise.corner_px)
+        + n * 6.0 * (np.log(noise.flange_m) + np.log(noise.flange_rad))
+        + reduced.log_det_own
+        + square_sum
+    )
+    if c:
+        minus_two_log += c * 2.0 * np.log(noise.print_m)
+    if restricted:
+        minus_two_log += log_det
+    elif c:
+        block = reduced.shared[-c:, -c:]
+        minus_two_log += solve_scaled(block, np.zeros(c))[2]
+    return Profile(step, covariance, reduced, float(minus_two_log), square_sum)
+
+
+def _vector(noise: Noise, with_print: bool) -> FloatArray:
+    levels = [noise.corner_px, noise.flange_m, noise.flange_rad]
+    return np.log([*levels, noise.print_m] if with_print else levels)
+
+
+def estimate_noise(
+    equations: JointEquations, guess: Noise, *, restricted: bool = True
+) -> tuple[Noise, float]:
+    """Noise levels that make the data most likely, and -2 log likelihood there."""
+    with_print = equations.corner_numbers > 0
+    low, high = _vector(LEAST, with_print), _vector(MOST, with_print)
+    start = np.clip(_vector(guess, with_print), low + 0.1, high - 0.1)
+
+    def cost(levels: FloatArray) -> float:
+        return profile(equations, Noise(*np.exp(levels)), restricted=restricted).minus_two_log
+
+    found = minimize(
+        cost,
+        start,
+        method="L-BFGS-B",
+        bounds=list(zip(low, high, strict=True)),
+        options={"maxiter": 40, "ftol": 1e-9, "eps": 1e-4},
+    )
+    return Noise(*(float(v) for v in np.exp(found.x))), float(found.fun)
