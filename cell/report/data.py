@@ -76,6 +76,9 @@ class Evidence:
         (N, 3) error of the camera's position, metres.
     turn_before_rad, turn_after_rad:
         (N, 3) error of the camera's orientation as rotation vectors, radians.
+    shift_without_m, turn_without_rad:
+        The same errors by effect name, under the final model with that one effect left out; they
+        show an effect apart from the others, and take the place of before where they are given.
     alpha_px, alpha_sigma_px:
         (N,) scale factor of each view left free, and its one-sigma, pixels.
     board_offset_m:
@@ -88,6 +91,8 @@ class Evidence:
     shift_after_m: FloatArray | None = None
     turn_before_rad: FloatArray | None = None
     turn_after_rad: FloatArray | None = None
+    shift_without_m: Mapping[str, FloatArray] = field(default_factory=dict)
+    turn_without_rad: Mapping[str, FloatArray] = field(default_factory=dict)
     alpha_px: FloatArray | None = None
     alpha_sigma_px: FloatArray | None = None
     board_offset_m: FloatArray | None = None

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
+from typing import TypeGuard
 
 UNKNOWN = "not known"
 
+_SMALL = 1e-3
+_SUFFIX = re.compile(r"_?(rad_per_Nm|rad_per_g|px_per_g|m_rad2|px_m2|px|rad|m|s)?(?:_(\d))?$")
 _SMALLER = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "s": ("ms", 1e3)}
 NAMES = {
     "zhang_algebraic": "Zhang, algebraic",
@@ -29,7 +33,7 @@ SYMBOLS = {
 }
 
 
-def known(value: object) -> bool:
+def known(value: object) -> TypeGuard[float]:
     """Whether `value` is a finite number."""
     return isinstance(value, int | float) and math.isfinite(value)
 
@@ -40,28 +44,49 @@ def solution_name(key: str) -> str:
 
 
 def symbol(key: str) -> str:
-    """A parameter's key as its symbol, or readable."""
-    return SYMBOLS.get(key, key.replace("_", " "))
+    """A parameter's key as its symbol, or in words without its unit."""
+    if key in SYMBOLS:
+        return SYMBOLS[key]
+    match = _SUFFIX.search(key)
+    stem = key[: match.start()] if match else key
+    joint = f"joint {match.group(2)}" if match and match.group(2) else ""
+    return ", ".join(part for part in (stem.replace("_", " "), joint) if part) or "size"
 
 
 def number(value: float | None, unit: str = "", digits: int = 3) -> str:
     """`value` to `digits` significant digits, with its unit."""
-    if value is None or not known(value):
+    if not known(value):
         return UNKNOWN
+    if 0 < abs(value) < _SMALL:
+        return _join(_power(value, digits), unit)
     return _join(_fixed(value, _decimals(value, digits)), unit)
 
 
 def measured(value: float | None, sigma: float | None, unit: str = "") -> str:
     """Value ± one sigma, both to two digits of sigma; says so where sigma is unknown."""
-    if value is None or not known(value):
+    if not known(value):
         return UNKNOWN
     value, sigma, unit = _readable(value, sigma, unit)
-    if sigma is None or not known(sigma) or sigma <= 0:
+    if not known(sigma) or sigma <= 0:
         return f"{number(value, unit, 5)} (± not known)"
+    return _join(plus_minus(value, sigma), unit)
+
+
+def plus_minus(value: float | None, sigma: float | None) -> str:
+    """Value ± sigma without unit, for a table that names it; alone where sigma is unknown."""
+    if not known(value) or not known(sigma) or sigma <= 0:
+        return number(value, "", 5)
+    if max(abs(value), sigma) < _SMALL:
+        return _scientific(value, sigma)
     decimals = _decimals(sigma, 2)
-    if max(abs(value), sigma) < 1e-3:
-        return _scientific(value, sigma, unit)
-    return _join(f"{_fixed(value, decimals)} ± {_fixed(sigma, decimals)}", unit)
+    return f"{_fixed(value, decimals)} ± {_fixed(sigma, decimals)}"
+
+
+def probability(p: float | None) -> str:
+    """A p-value with its sign of relation."""
+    if not known(p):
+        return UNKNOWN
+    return "< 10⁻⁹" if p < 1e-9 else f"= {number(p, '', 2)}"
 
 
 def millimetres(value_m: float | None, digits: int = 2) -> str:
@@ -87,12 +112,17 @@ def _fixed(value: float, decimals: int) -> str:
     return text.replace("-", "−") if float(text) != 0 else text.lstrip("-")
 
 
-def _scientific(value: float, sigma: float, unit: str) -> str:
+def _power(value: float, digits: int) -> str:
+    power = math.floor(math.log10(abs(value)))
+    return f"{_fixed(value / 10.0**power, digits - 1)}·10{_superscript(power)}"
+
+
+def _scientific(value: float, sigma: float) -> str:
     power = math.floor(math.log10(max(abs(value), sigma)))
     scale = 10.0**power
     decimals = max(_decimals(sigma / scale, 2), 0)
     pair = f"({_fixed(value / scale, decimals)} ± {_fixed(sigma / scale, decimals)})"
-    return _join(f"{pair}·10{_superscript(power)}", unit)
+    return f"{pair}·10{_superscript(power)}"
 
 
 def _superscript(power: int) -> str:
@@ -100,4 +130,5 @@ def _superscript(power: int) -> str:
 
 
 def _join(text: str, unit: str) -> str:
-    return f"{text} {unit}".rstrip()
+    pretty = unit.replace("^2", "²").replace(" m", "·m")
+    return text if unit in ("", "1") else f"{text} {pretty}"

@@ -6,6 +6,7 @@ import hashlib
 import io
 import re
 from collections.abc import Callable, Sequence
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "zhang_algebraic": {"color": ORANGE, "marker": "v", "linestyle": "--"},
 }
 _OTHER = {"color": PURPLE, "marker": "x", "linestyle": ":"}
-_RC: dict[str, Any] = {
+_RC: Any = {  # Any: the stubs type every key apart
     "svg.fonttype": "none",
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
@@ -83,7 +84,7 @@ def inline_svg(draw: Callable[[], Figure | None], label: str) -> str | None:
 
     # each drawing gets its own salt: ids of clip paths must differ within one page
     salt = hashlib.sha256(label.encode()).hexdigest()[:12]
-    with matplotlib.rc_context({**_RC, "svg.hashsalt": salt}):
+    with matplotlib.rc_context(_RC | {"svg.hashsalt": salt}):
         figure = draw()
         if figure is None:
             return None
@@ -99,6 +100,4 @@ def _embeddable(svg: str, label: str) -> str:
     body = re.sub(r'<g id="[^"]*"', "<g", body)
     body = re.sub(r' (?:width|height)="[\d.]+pt"', "", body, count=2)
     body = re.sub(r"\n\s*", "\n", body)
-    from html import escape
-
     return body.replace("<svg ", f'<svg role="img" aria-label="{escape(label)}" ', 1)

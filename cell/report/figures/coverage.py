@@ -55,8 +55,11 @@ def _image(ax: Axes, data: ReportData) -> None:
 
 
 def _distances(ax: Axes, data: ReportData, board_from_camera: np.ndarray) -> None:
+    from matplotlib.ticker import MaxNLocator
+
     distance = distance_m(board_from_camera, data.views.board)
     ax.hist(distance[np.isfinite(distance)], bins=12, color=BLUE, edgecolor="white")
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set(title="distances", xlabel="distance (m)", ylabel="frames")
 
 

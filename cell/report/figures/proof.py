@@ -35,7 +35,7 @@ def draw_holdout(data: ReportData) -> Figure | None:
     before, after = holdout.get("rms_px_before"), holdout.get("rms_px_after")
     if not known(before) or not known(after):
         return None
-    figure, (ax,) = panels(6.0, 1.9)
+    figure, (ax,) = panels(9.2, 1.5)
     bars = ax.barh(["after", "before"], [after, before], color=[BLUE, VERMILLION], height=0.55)
     bars[1].set_hatch("//")
     ax.bar_label(bars, fmt="%.3g px", padding=4)

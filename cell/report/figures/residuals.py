@@ -10,6 +10,7 @@ from scipy.stats import norm
 from calib.views import FloatArray, Views
 from cell.report.data import ReportData
 from cell.report.figures.canvas import BLACK, BLUE, VERMILLION, panels
+from cell.report.numbers import solution_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,6 +26,7 @@ def draw(data: ReportData, name: str) -> Figure | None:
         return None
     figure, axes = panels(9.2, 3.3, columns=2, width_ratios=[1.45, 1])
     field(axes[0], data.views, residual)
+    axes[0].set_title(solution_name(name))
     _histogram(axes[1], residual)
     return figure
 
@@ -52,8 +54,10 @@ def field(ax: Axes, views: Views, residual_px: FloatArray, key_px: float | None 
            xlabel="u (px)", ylabel="v (px)", title="mean residual over the image")  # fmt: skip
     if not len(centre):
         return
-    shade = ax.scatter(*centre.T, c=rms, cmap="cividis_r", s=70, marker="s", alpha=0.85, vmin=0,
-                       linewidths=0)  # fmt: skip
+    shade = ax.scatter(
+        centre[:, 0], centre[:, 1], c=rms, cmap="cividis_r", vmin=0, s=70, marker="s", alpha=0.85,
+        linewidths=0,
+    )  # fmt: skip
     unit = key_px or _round(float(np.quantile(np.hypot(*mean.T), 0.9)))
     arrows = ax.quiver(
         *centre.T, *mean.T, angles="xy", scale_units="xy", width=0.004, color=BLACK,
@@ -70,7 +74,7 @@ def _histogram(ax: Axes, residual: FloatArray) -> None:
     looks = ((0, BLUE, "-", "u"), (1, VERMILLION, "--", "v"))
     for axis, colour, line, name in looks:
         values = residual[..., axis][np.isfinite(residual[..., axis])]
-        ax.hist(values, edges, density=True, histtype="step", color=colour, linestyle=line,
+        ax.hist(values, edges.tolist(), density=True, histtype="step", color=colour, linestyle=line,
                 linewidth=1.3, label=f"{name}: σ {values.std():.3g} px")  # fmt: skip
     # the middle of the residuals says how wide the bell would be without outliers
     middle = 1.4826 * float(np.nanmedian(np.abs(residual)))

@@ -58,6 +58,8 @@ def _panel(ax: Axes, data: ReportData, factors: list[Mapping[str, float]], lette
     _law(ax, data, letter, distance)
     _constants(ax, data, letter)
     _truth(ax, data, letter)
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + 0.09 * (high - low))  # room for the zones' names
     ax.set(title=f"{greek} against distance", xlabel="distance (m)", ylabel=f"{greek} (px)")
 
 

@@ -81,7 +81,7 @@ def draw(data: ReportData) -> Figure | None:
     drawn = {name: error for name, error in found.items() if error is not None}
     if not drawn:
         return None
-    figure, (ax,) = panels(6.0, 3.1)
+    figure, (ax,) = panels(5.3, 3.4)
     for name, error in drawn.items():
         look = style(name)
         ax.plot(error.distance_m, error.error_m * 1e3, linestyle="", marker=look["marker"],
@@ -92,5 +92,5 @@ def draw(data: ReportData) -> Figure | None:
     ax.set_yscale("log")
     ax.yaxis.set_major_formatter("{x:g}")
     ax.set(xlabel="distance (m)", ylabel="error at the work piece (mm)")
-    legend_below(figure, [ax])
+    legend_below(figure, [ax], columns=2)
     return figure

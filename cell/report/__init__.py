@@ -1,0 +1,8 @@
+"""The report: one self-contained HTML file for the people who use the camera."""
+
+from __future__ import annotations
+
+from cell.report.data import Evidence, ReportData, SolutionPoses, Truth
+from cell.report.page import write_report
+
+__all__ = ["Evidence", "ReportData", "SolutionPoses", "Truth", "write_report"]

@@ -1,0 +1,60 @@
+"""Arm and mount: where the camera was, by the robot and by each solution."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from cell.report import html
+from cell.report.data import ReportData
+from cell.report.figures import camera_positions, position_errors
+from cell.report.numbers import measured
+from cell.report.sections.drawing import drawing
+
+_NO_ROBOT = "No flange pose was logged, so the camera's true positions are not known."
+
+
+def poses(data: ReportData) -> str:
+    """Camera positions, their errors, and the two poses solved with them."""
+    positions = drawing(
+        lambda: camera_positions.draw(data),
+        "Camera positions in the board's frame: stars where the arm carried the camera, open "
+        "marks where the pictures put it. Compare Fig. 3 of the paper.",
+        "No camera poses are at hand to draw.",
+    )
+    errors = drawing(
+        lambda: position_errors.draw(data),
+        "Camera position, computed less true, in the true camera's axes (z along the optical "
+        "axis, positive towards the board). Compare Figs. 4 and 15 of the paper.",
+        _NO_ROBOT,
+    )
+    return html.section("arm", "Arm and mount: where the camera was", positions, errors,
+                        _solved(data))  # fmt: skip
+
+
+def _solved(data: ReportData) -> str:
+    calibration = data.calibration or {}
+    names = ("flange_from_camera", "base_from_board", "flange_from_board", "base_from_camera")
+    rows = [_pose_row(name, calibration[name]) for name in names if calibration.get(name)]
+    if not rows:
+        return html.missing("The camera's place on the flange was not solved: " + _NO_ROBOT)
+    head = ("pose", "x", "y", "z", "quaternion x, y, z, w", "± turn")
+    return html.table(head, rows, "Solved together with the camera, one-sigma uncertainties")
+
+
+def _pose_row(name: str, pose: Mapping[str, Any]) -> tuple[str, ...]:
+    sigma = _three(pose.get("sigma_p_m"))
+    turn = pose.get("sigma_r_rad")
+    turn = max(_three(turn)) if isinstance(turn, list) else turn
+    position = (measured(value, each, "m") for value, each in zip(pose["p_m"], sigma, strict=True))
+    quaternion = ", ".join(f"{q:.5f}".replace("-", "−") for q in pose["q_xyzw"])
+    shown = "not known" if turn is None else f"{math.degrees(turn):.2g}°"
+    return (name, *position, quaternion, shown)
+
+
+def _three(sigma: object) -> list[float]:
+    """Three sigmas, where the file gives one for all axes or none."""
+    if isinstance(sigma, list):
+        return sigma
+    return [float(sigma)] * 3 if isinstance(sigma, int | float) else [math.nan] * 3
