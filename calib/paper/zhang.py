@@ -72,6 +72,34 @@ def zhang_camera_matrix(
     return np.asarray(np.linalg.inv(shrink) @ _unpack(vt[5]))
 
 
+def centred_camera_matrix(homographies: FloatArray, width_px: int, height_px: int) -> FloatArray:
+    """Camera matrix with the principal point at the image's centre and no skew.
+
+    Zhang's two constraints per view, linear in 1/alpha^2 and 1/beta^2: a start where the full
+    closed form has no real solution.
+
+    Raises
+    ------
+    CalibrationError
+        No real camera fits even so.
+    """
+    centre = np.array([(width_px - 1) / 2, (height_px - 1) / 2])
+    H = homographies.copy()
+    H[:, :2] -= centre[:, None] * H[:, 2:]
+    H = H / np.linalg.norm(H[:, :2, :2], axis=(1, 2), keepdims=True)
+    a, b = H[:, :, 0], H[:, :, 1]
+    rows = np.concatenate([a * b, a**2 - b**2])
+    size = width_px * height_px / 4
+    solution = np.linalg.lstsq(rows[:, :2] * [1 / size, 1 / size], -rows[:, 2], rcond=None)[0]
+    if not (solution > 0).all():
+        raise CalibrationError(
+            "no real camera fits these views: tilt the board 20 to 45 degrees about both axes, or"
+            " check the board's rows and columns"
+        )
+    alpha, beta = np.sqrt(size / solution)
+    return np.array([[alpha, 0, centre[0]], [0, beta, centre[1]], [0, 0, 1]])
+
+
 def _v(H: FloatArray, i: int, j: int) -> FloatArray:
     a, b = H[:, :, i], H[:, :, j]
     return np.stack(

@@ -83,9 +83,9 @@ def eliminate(equations: FrameEquations, prior: FloatArray, damping: float = 0.0
     covariance = np.linalg.inv(normal) * scale[:, :, None] * scale[:, None, :]
     back = covariance @ equations.own_shared
     at_zero = np.einsum("nij,nj->ni", covariance, equations.own_residual)
-    gathered = equations.own_shared.reshape(-1, equations.own_shared.shape[2])
-    p = gathered.shape[1]
-    shared = equations.shared - gathered.T @ back.reshape(-1, p)
+    n, six, p = equations.own_shared.shape
+    gathered = equations.own_shared.reshape(n * six, p)
+    shared = equations.shared - gathered.T @ back.reshape(n * six, p)
     shared_residual = equations.shared_residual - gathered.T @ at_zero.reshape(-1)
     _, log_det = np.linalg.slogdet(normal)
     return Reduced(
@@ -107,6 +107,8 @@ def solve_scaled(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, Flo
     The solution, the inverse of the matrix, and its log-determinant. Directions that the data do
     not determine (relative eigenvalue below 1e-13) are left where they are.
     """
+    if matrix.size == 0:  # only the frames' own numbers are free
+        return right.copy(), matrix.copy(), 0.0
     diagonal = np.diag(matrix).copy()
     scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 0.0)
     normal = matrix * scale[:, None] * scale[None, :]

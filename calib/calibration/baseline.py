@@ -1,0 +1,232 @@
+"""Zhang's baseline: closed form, then maximum likelihood with one focal length for all frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.calibration.frames import Usable, require_frames
+from calib.calibration.result import VALUES, Rejection, Solution
+from calib.chain.optics import COLUMN, optics_row
+from calib.chain.projection import project
+from calib.errors import CalibrationError
+from calib.paper.extrinsics import board_poses
+from calib.paper.zhang import centred_camera_matrix, zhang_algebraic
+from calib.solver.free_poses import FreePoseFit, fit_free_poses
+from calib.views import BoolArray, FloatArray, Views
+
+FRAME_OUTLIER = 6.0
+"""A frame this many times worse than the median one is a wrong detection."""
+
+CORNER_OUTLIER = 8.0
+_FRAME_FLOOR_PX = 0.5
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Zhang's two solutions, and what was thrown out on the way.
+
+    Attributes
+    ----------
+    algebraic:
+        None where the closed form has no solution; `missing` tells why.
+    mle:
+        Maximum likelihood.
+    used:
+        (N,) frames.
+    weight:
+        (N, M) one for a corner that takes part.
+    """
+
+    algebraic: Solution | None
+    mle: Solution
+    used: BoolArray
+    weight: FloatArray
+    rejected: tuple[Rejection, ...]
+    missing: dict[str, str]
+
+
+def fit_baseline(views: Views, usable: Usable) -> Baseline:
+    """Zhang's calibration, wrong frames and corners left out.
+
+    Raises
+    ------
+    CalibrationError
+        The views do not fix the camera.
+    """
+    missing: dict[str, str] = {}
+    optics, poses = _start(views, usable, missing)
+    used, weight = usable.used.copy(), views.seen.astype(float)
+    rejected: list[Rejection] = list(usable.rejected)
+    for _ in range(4):
+        fit = fit_subset(views, used, optics, poses, weight, VALUES)
+        worse = _bad_frames(fit.residual_px, views, used)
+        weight = _corner_weight(fit.residual_px, views, used)
+        if not worse:
+            break
+        rejected += worse
+        used = used & ~np.isin(views.frame, [r.frame for r in worse])
+        require_frames(int(used.sum()), len(views))
+    fit = fit_subset(views, used, fit.optics[np.flatnonzero(used)[0]], poses, weight, VALUES)
+    _check(fit, views)
+    algebraic = _algebraic(views, usable, used, weight, missing)
+    mle = as_solution(fit, weight, VALUES)
+    return Baseline(algebraic, mle, used, weight, tuple(rejected), missing)
+
+
+def _start(views: Views, usable: Usable, missing: dict[str, str]) -> tuple[FloatArray, FloatArray]:
+    """(K,) optics and (N, 4, 4) poses near enough for the iteration."""
+    poses = np.full((len(views), 4, 4), np.nan)
+    homographies = usable.homographies[usable.used]
+    try:
+        row, poses[usable.used] = zhang_algebraic(
+            homographies,
+            views.board.corners_m,
+            views.corners_px[usable.used],
+            views.width_px,
+            views.height_px,
+        )
+        if _plausible(row, views):
+            row[COLUMN["skew_px"]] = 0.0
+            row[[COLUMN["k1"], COLUMN["k2"]]] = 0.0
+            return row, poses
+    except CalibrationError as error:
+        missing["zhang_algebraic"] = str(error)
+    A = centred_camera_matrix(homographies, views.width_px, views.height_px)
+    poses[usable.used] = board_poses(homographies, A)
+    row = optics_row(
+        alpha_px=A[0, 0],
+        beta_px=A[1, 1],
+        u0_px=A[0, 2],
+        v0_px=A[1, 2],
+        height_px=views.height_px,
+    )
+    return row, poses
+
+
+def _plausible(row: FloatArray, views: Views) -> bool:
+    size = max(views.width_px, views.height_px)
+    alpha, beta = row[COLUMN["alpha_px"]], row[COLUMN["beta_px"]]
+    centred = (
+        abs(row[COLUMN["u0_px"]] / views.width_px - 0.5) < 0.4
+        and abs(row[COLUMN["v0_px"]] / views.height_px - 0.5) < 0.4
+    )
+    return bool(centred and 0.2 * size < alpha < 50 * size and 0.6 < alpha / beta < 1.6)
+
+
+def fit_subset(
+    views: Views,
+    used: BoolArray,
+    optics: FloatArray,
+    camera_from_board: FloatArray,
+    weight: FloatArray,
+    free: tuple[str, ...],
+) -> FreePoseFit:
+    """`fit_free_poses` on the used frames, its arrays spread over all N with NaN elsewhere."""
+    rows = np.broadcast_to(optics, (len(views), optics.shape[-1]))
+    fit = fit_free_poses(
+        rows[used],
+        camera_from_board[used],
+        views.board.corners_m,
+        views.corners_px[used],
+        free,
+        weight=weight[used],
+    )
+
+    def spread(values: FloatArray) -> FloatArray:
+        out = np.full((len(views), *values.shape[1:]), np.nan)
+        out[used] = values
+        return out
+
+    return replace(
+        fit,
+        optics=spread(fit.optics),
+        camera_from_board=spread(fit.camera_from_board),
+        residual_px=spread(fit.residual_px),
+    )
+
+
+def as_solution(fit: FreePoseFit, weight: FloatArray, free: tuple[str, ...]) -> Solution:
+    """A fit in the words of the result; the values are those of its first used frame."""
+    first = fit.optics[np.flatnonzero(np.isfinite(fit.optics[:, 0]))[0]]
+    sigma = np.sqrt(np.diag(fit.covariance))
+    return Solution(
+        optics=fit.optics,
+        camera_from_board=fit.camera_from_board,
+        residual_px=np.where(weight[..., None] > 0, fit.residual_px, np.nan),
+        values={name: float(first[COLUMN[name]]) for name in VALUES},
+        sigma={name: float(s) for name, s in zip(free, sigma, strict=True)},
+    )
+
+
+def _bad_frames(residual_px: FloatArray, views: Views, used: BoolArray) -> list[Rejection]:
+    """Frames whose typical corner is far worse than in the typical frame."""
+    distance = np.linalg.norm(residual_px, axis=2)
+    typical = np.full(len(views), np.nan)
+    typical[used] = np.nanmedian(distance[used], axis=1)
+    limit = FRAME_OUTLIER * max(float(np.nanmedian(typical)), _FRAME_FLOOR_PX / FRAME_OUTLIER)
+    return [
+        Rejection(
+            int(views.frame[i]),
+            f"its corners miss the board by {typical[i]:.1f} px, {limit:.1f} px is the limit:"
+            " a wrong detection",
+        )
+        for i in np.flatnonzero(np.nan_to_num(typical) > limit)
+    ]
+
+
+def _corner_weight(residual_px: FloatArray, views: Views, used: BoolArray) -> FloatArray:
+    """Zero for a corner far worse than its frame's typical one."""
+    distance = np.linalg.norm(np.nan_to_num(residual_px), axis=2)
+    typical = np.ones(len(views))
+    for i in np.flatnonzero(used):
+        typical[i] = max(float(np.median(distance[i, views.seen[i]])), 1e-6)
+    return np.asarray(views.seen & (distance < CORNER_OUTLIER * typical[:, None]), dtype=float)
+
+
+def _check(fit: FreePoseFit, views: Views) -> None:
+    alpha = np.nanmean(fit.optics[:, COLUMN["alpha_px"]])
+    sigma = np.sqrt(fit.covariance[0, 0])
+    if not (np.isfinite(sigma) and 0 < sigma < 0.3 * alpha):
+        raise CalibrationError(
+            f"the views leave the focal length open ({alpha:.0f} ± {sigma:.0f} px):"
+            " add views with the board tilted 20 to 45 degrees about both axes"
+        )
+
+
+def _algebraic(
+    views: Views,
+    usable: Usable,
+    used: BoolArray,
+    weight: FloatArray,
+    missing: dict[str, str],
+) -> Solution | None:
+    corners = np.where(weight[..., None] > 0, views.corners_px, np.nan)
+    try:
+        row, found = zhang_algebraic(
+            usable.homographies[used],
+            views.board.corners_m,
+            corners[used],
+            views.width_px,
+            views.height_px,
+        )
+    except CalibrationError as error:
+        missing["zhang_algebraic"] = str(error)
+        return None
+    missing.pop("zhang_algebraic", None)
+    return unfitted_solution(views, used, weight, np.tile(row, (len(found), 1)), found)
+
+
+def unfitted_solution(
+    views: Views, used: BoolArray, weight: FloatArray, optics: FloatArray, poses: FloatArray
+) -> Solution:
+    """A solution that was computed and not fitted, from the used frames' optics and poses."""
+    full_optics = np.full((len(views), optics.shape[1]), np.nan)
+    full_poses = np.full((len(views), 4, 4), np.nan)
+    residual = np.full_like(views.corners_px, np.nan)
+    full_optics[used], full_poses[used] = optics, poses
+    residual[used] = views.corners_px[used] - project(optics, poses, views.board.corners_m)
+    residual[weight == 0] = np.nan
+    values = {name: float(optics[0, COLUMN[name]]) for name in VALUES}
+    return Solution(full_optics, full_poses, residual, values, {})

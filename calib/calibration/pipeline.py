@@ -1,0 +1,143 @@
+"""From views to a calibration: baseline, robot, the paper's method, and the joint fit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calib.calibration.baseline import Baseline, fit_baseline, fit_subset
+from calib.calibration.frames import usable_frames
+from calib.calibration.paper_method import PaperResult, board_depth_m, run_paper_method
+from calib.calibration.result import VALUES, Calibration, PositionError, Solution
+from calib.calibration.robot import RobotFit, fit_robot, hand_eye_of
+from calib.chain.model import walk
+from calib.chain.optics import COLUMN
+from calib.errors import CalibrationError
+from calib.handeye import camera_position_error_m
+from calib.solver.joint import JointFit
+from calib.views import FloatArray, Views
+
+_ROBOT_RESULTS = (
+    "robot",
+    "joint_ml",
+    "scale_factors",
+    "zones",
+    "focus_law",
+    "fixed_alpha_algebraic",
+    "fixed_alpha_mle",
+)
+
+
+def calibrate(views: Views) -> Calibration:
+    """Calibrate the camera in every way the views allow.
+
+    What the views do not allow stands in `missing` with the reason; without flange poses there
+    is Zhang's calibration and nothing of the robot.
+
+    Raises
+    ------
+    CalibrationError
+        Not even Zhang's calibration is possible: fewer than three usable frames, or frames that
+        do not fix the camera.
+    """
+    usable = usable_frames(views)
+    baseline = fit_baseline(views, usable)
+    solutions = {"zhang_mle": baseline.mle}
+    if baseline.algebraic is not None:
+        solutions["zhang_algebraic"] = baseline.algebraic
+    missing = dict(baseline.missing)
+    robot = _robot(views, baseline, missing)
+    paper = PaperResult((), None, None, None, {}, {})
+    if robot is not None:
+        paper = _paper(views, baseline, usable.homographies, robot)
+        solutions |= paper.solutions
+        missing |= paper.missing
+        if robot.joint is not None:
+            solutions["joint_ml"] = joint_solution(views, baseline, robot, robot.joint)
+    reference = None if robot is None else robot.reference
+    return Calibration(
+        frame=views.frame,
+        used=baseline.used,
+        rejected=tuple(sorted(baseline.rejected, key=lambda r: r.frame)),
+        solutions=solutions,
+        scale_factors=paper.scale_factors,
+        zones=paper.zones,
+        focus_law=paper.focus_law,
+        beta_law=paper.beta_law,
+        robot=reference,
+        position_error={} if robot is None else _position_errors(views, solutions, robot),
+        missing=missing,
+    )
+
+
+def _robot(views: Views, baseline: Baseline, missing: dict[str, str]) -> RobotFit | None:
+    first = baseline.mle.optics[np.flatnonzero(baseline.used)[0]]
+    residual = baseline.mle.residual_px
+    sigma_px = max(float(np.nanmedian(np.abs(residual))) / 0.6745, 1e-4)
+    try:
+        return fit_robot(
+            views,
+            baseline.used,
+            baseline.weight,
+            first,
+            baseline.mle.camera_from_board,
+            sigma_px,
+        )
+    except CalibrationError as error:
+        missing |= dict.fromkeys(_ROBOT_RESULTS, str(error))
+        return None
+
+
+def _paper(
+    views: Views, baseline: Baseline, homographies: FloatArray, robot: RobotFit
+) -> PaperResult:
+    try:
+        return run_paper_method(
+            views, baseline.used, baseline.weight, homographies, baseline.mle, robot.reference
+        )
+    except CalibrationError as error:
+        return PaperResult((), None, None, None, {}, dict.fromkeys(_ROBOT_RESULTS[2:], str(error)))
+
+
+def joint_solution(views: Views, baseline: Baseline, robot: RobotFit, joint: JointFit) -> Solution:
+    """The joint fit's camera, with each frame's pose from its picture alone.
+
+    Poses that the robot had a say in would agree with the robot by construction.
+    """
+    state = walk(joint.model, views.take(robot.taken), flange_error=joint.flange_error)
+    optics = np.zeros((len(views), state.optics.shape[1]))
+    optics[robot.taken] = state.optics
+    start = np.full((len(views), 4, 4), np.nan)
+    start[robot.taken] = state.camera_from_board
+    fit = fit_subset(views, robot.taken, optics, start, baseline.weight, ())
+    at = float(np.median(board_depth_m(views, fit.camera_from_board)[robot.taken]))
+    moving = robot.reference.law is not None
+    middle = np.argmin(np.abs(state.distance_m - at))
+    return Solution(
+        optics=fit.optics,
+        camera_from_board=fit.camera_from_board,
+        residual_px=np.where(baseline.weight[..., None] > 0, fit.residual_px, np.nan),
+        values={name: float(state.optics[middle, COLUMN[name]]) for name in VALUES},
+        sigma={u.name: joint.sigma(u.name) for u in joint.unknowns if u.name in VALUES},
+        at_distance_m=float(state.distance_m[middle]) if moving else None,
+    )
+
+
+def _position_errors(
+    views: Views, solutions: dict[str, Solution], robot: RobotFit
+) -> dict[str, PositionError]:
+    by_robot = robot.reference.camera_from_board(views.base_from_flange)
+    by_robot[~robot.taken] = np.nan
+    return {name: _position_error(views, s, robot, by_robot) for name, s in solutions.items()}
+
+
+def _position_error(
+    views: Views, solution: Solution, robot: RobotFit, by_robot: FloatArray
+) -> PositionError:
+    common = camera_position_error_m(solution.camera_from_board, by_robot)
+    try:
+        own = hand_eye_of(views, robot.taken, solution.camera_from_board)
+    except CalibrationError:
+        return PositionError(common, None, None)
+    again = own.camera_from_board(views.base_from_flange)
+    again[~robot.taken] = np.nan
+    return PositionError(common, camera_position_error_m(solution.camera_from_board, again), own)

@@ -1,0 +1,174 @@
+"""What a calibration says, as frozen dataclasses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.handeye import HandEye, chain
+from calib.paper.focus_law import FocusLaw, FocusLawChoice
+from calib.paper.scale_factors import ScaleFactor
+from calib.paper.zones import Zones
+from calib.views import BoolArray, FloatArray, Mount
+
+VALUES = ("alpha_px", "beta_px", "u0_px", "v0_px", "skew_px", "k1", "k2")
+"""The numbers every solution has, in the order of the paper's Table 2."""
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """A frame left out, and why."""
+
+    frame: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Mean, spread and root mean square of position errors, metres, in the true camera's frame."""
+
+    mean: tuple[float, float, float]
+    std: tuple[float, float, float]
+    rms: float
+
+    @classmethod
+    def of(cls, error_m: FloatArray) -> Statistics:
+        """From (N, 3) errors; rows with NaN are left out."""
+        e = error_m[np.isfinite(error_m).all(axis=1)]
+        mean, std = e.mean(axis=0), e.std(axis=0)
+        return cls(
+            (float(mean[0]), float(mean[1]), float(mean[2])),
+            (float(std[0]), float(std[1]), float(std[2])),
+            float(np.sqrt((e**2).sum(axis=1).mean())),
+        )
+
+
+@dataclass(frozen=True)
+class Solution:
+    """One camera model with the poses it gives.
+
+    Attributes
+    ----------
+    optics, camera_from_board:
+        (N, K), (N, 4, 4) of every view; NaN for a view that was rejected.
+    residual_px:
+        (N, M, 2) detected minus predicted; NaN where not used.
+    sigma:
+        One-sigma by name, of the numbers that were fitted.
+    at_distance_m:
+        Distance at which alpha and beta are told where they move, else None.
+    values:
+        The numbers of `VALUES`.
+    """
+
+    optics: FloatArray
+    camera_from_board: FloatArray
+    residual_px: FloatArray
+    values: Mapping[str, float]
+    sigma: Mapping[str, float]
+    at_distance_m: float | None = None
+
+    @property
+    def reprojection_px(self) -> dict[str, float]:
+        """Signed mean, median and spread of the components (Table 1); rms per corner."""
+        r = self.residual_px[np.isfinite(self.residual_px)]
+        return {
+            "mean": float(r.mean()),
+            "median": float(np.median(r)),
+            "std": float(r.std()),
+            "rms": float(np.sqrt(2 * (r**2).mean())),
+        }
+
+
+@dataclass(frozen=True)
+class RobotReference:
+    """Both constant transforms of the robot's chain, from one fit of everything together.
+
+    Attributes
+    ----------
+    mount, flange_from_mounted, base_from_fixed:
+        See `calib.handeye.HandEye`.
+    covariance:
+        (12, 12) of the increments on the right of both.
+    flange_sigma_m, flange_sigma_rad, corner_sigma_px:
+        Noise levels that the fit estimated.
+    law:
+        Label of the focus effect the fit preferred, or None for a lens that keeps still.
+    gain_aic:
+        How much that law gains over a lens that keeps still.
+    outliers:
+        Frames whose logged pose disagrees with their picture.
+    source:
+        `joint` or, where the joint fit failed, `hand_eye`.
+    """
+
+    mount: Mount
+    flange_from_mounted: FloatArray
+    base_from_fixed: FloatArray
+    covariance: FloatArray
+    flange_sigma_m: float
+    flange_sigma_rad: float
+    corner_sigma_px: float
+    law: str | None
+    gain_aic: float
+    outliers: tuple[int, ...]
+    source: str
+
+    def camera_from_board(self, base_from_flange: FloatArray) -> FloatArray:
+        """(N, 4, 4) where the robot says the board is."""
+        return chain(self.mount, self.flange_from_mounted, base_from_flange, self.base_from_fixed)
+
+
+@dataclass(frozen=True)
+class PositionError:
+    """Camera position of one solution against the robot, (N, 3) metres, camera frame, z forward.
+
+    Attributes
+    ----------
+    common:
+        Against the transforms of the joint fit: the same yardstick for every solution.
+    own:
+        Against transforms solved anew from this solution's poses alone. A constant part of the
+        error disappears in them, so this is always the kinder number.
+    hand_eye:
+        Those transforms, or None where they could not be solved.
+    """
+
+    common: FloatArray
+    own: FloatArray | None
+    hand_eye: HandEye | None
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Everything a calibration found.
+
+    Attributes
+    ----------
+    frame, used:
+        (N,) frame numbers and which of them take part.
+    rejected:
+        The others, with reasons.
+    solutions:
+        By name; a name that could not be computed is in `missing`, with the reason.
+    scale_factors, zones, focus_law, beta_law:
+        The paper's sections 3.1 and 4.1; None or empty with a reason in `missing`.
+    robot, position_error:
+        The robot's side, and every solution's camera positions against it.
+    missing:
+        What could not be known, by name, and why.
+    """
+
+    frame: np.ndarray[tuple[int], np.dtype[np.int64]]
+    used: BoolArray
+    rejected: tuple[Rejection, ...]
+    solutions: Mapping[str, Solution]
+    scale_factors: tuple[ScaleFactor, ...]
+    zones: Zones | None
+    focus_law: FocusLawChoice | None
+    beta_law: FocusLaw | None
+    robot: RobotReference | None
+    position_error: Mapping[str, PositionError]
+    missing: Mapping[str, str]

@@ -1,0 +1,151 @@
+"""The robot's side: both constant transforms, from one fit of robot, lens and pictures together.
+
+Hand-eye from the poses of a wrong camera model takes up part of that model's error (a constant
+part along the axis all of it). So the common yardstick is the joint fit, whose lens may move with
+distance and whose robot may scatter; it is solved once and every solution is held against it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.calibration.result import RobotReference
+from calib.chain.effects import make_effect
+from calib.chain.model import CellModel
+from calib.chain.optics import COLUMN
+from calib.errors import CalibrationError
+from calib.handeye import HandEye, solve_hand_eye
+from calib.solver.joint import JointFit, fit_joint
+from calib.solver.noise import Noise
+from calib.solver.unknowns import PLAIN_OPTICS, unknowns_of
+from calib.views import BoolArray, FloatArray, Views
+
+DECISIVE_AIC = 6.0
+_FOCUS_LAWS = ("inverse_square", "thin_lens")
+_POSE = tuple(
+    f"{frame}.{axis}"
+    for frame in ("flange_from_mounted", "base_from_fixed")
+    for axis in ("x", "y", "z", "rx", "ry", "rz")
+)
+
+
+@dataclass(frozen=True)
+class RobotFit:
+    """The reference, and the joint fit it came from (None where only hand-eye worked).
+
+    `views` are those that took part, in the joint fit's order; `taken` (N,) says which.
+    """
+
+    reference: RobotReference
+    joint: JointFit | None
+    taken: BoolArray
+
+
+def fit_robot(
+    views: Views,
+    used: BoolArray,
+    weight: FloatArray,
+    optics: FloatArray,
+    camera_from_board: FloatArray,
+    sigma_px: float,
+) -> RobotFit:
+    """Solve hand-eye, then everything together with and without a lens that moves.
+
+    Parameters
+    ----------
+    views, used, weight:
+        The views, (N,) which count, (N, M) corner weights.
+    optics, camera_from_board:
+        (K,) and (N, 4, 4) of the baseline.
+    sigma_px:
+        Its corner noise.
+
+    Raises
+    ------
+    CalibrationError
+        No poses, too few, or motions that do not fix the transforms.
+    """
+    hand = hand_eye_of(views, used, camera_from_board)
+    taken = hand.used
+    corners = np.where(weight[..., None] > 0, views.corners_px, np.nan)
+    chosen = replace(views, corners_px=corners).take(taken)
+    outliers = tuple(int(f) for f in views.frame[used & views.has_pose & ~taken])
+    noise = Noise(sigma_px, max(hand.rms_m / 3, 1e-6), max(hand.rms_rad / 3, 1e-6))
+    plain = CellModel(_without_skew(optics), hand.flange_from_mounted, hand.base_from_fixed)
+    try:
+        law, joint, gain = _best_lens(plain, chosen, noise)
+    except (np.linalg.LinAlgError, FloatingPointError):
+        return RobotFit(_from_hand_eye(hand, sigma_px, outliers), None, taken)
+    places = [[u.name for u in joint.unknowns].index(name) for name in _POSE]
+    reference = RobotReference(
+        mount=views.mount,
+        flange_from_mounted=joint.model.flange_from_mounted,
+        base_from_fixed=joint.model.base_from_fixed,
+        covariance=joint.covariance[np.ix_(places, places)],
+        flange_sigma_m=joint.noise.flange_m,
+        flange_sigma_rad=joint.noise.flange_rad,
+        corner_sigma_px=joint.noise.corner_px,
+        law=law,
+        gain_aic=gain,
+        outliers=outliers,
+        source="joint",
+    )
+    return RobotFit(reference, joint, taken)
+
+
+def hand_eye_of(views: Views, used: BoolArray, camera_from_board: FloatArray) -> HandEye:
+    """Hand-eye from one solution's poses; raises `CalibrationError`."""
+    if not views.has_pose.any():
+        raise CalibrationError(
+            "no frame has a logged flange pose: without them nothing is known of hand-eye,"
+            " distances and true camera positions"
+        )
+    poses = np.where(used[:, None, None], camera_from_board, np.nan)
+    centre = views.board.corners_m.mean(axis=0)
+    return solve_hand_eye(poses, views.base_from_flange, views.mount, centre)
+
+
+def _without_skew(optics: FloatArray) -> FloatArray:
+    row = optics.copy()
+    row[COLUMN["skew_px"]] = 0.0
+    return row
+
+
+def _best_lens(plain: CellModel, views: Views, noise: Noise) -> tuple[str | None, JointFit, float]:
+    """The joint fit with the lens law the data prefer, and its gain in AIC over none."""
+    still = _fit(plain, views, noise)
+    start = still.model
+    best: tuple[str | None, JointFit] = (None, still)
+    for law in _FOCUS_LAWS:
+        effect = make_effect("focus_breathing", {"law": law})
+        moving = _fit(start.with_effects([effect]), views, still.noise)
+        if _aic(moving) < _aic(best[1]):
+            best = (law, moving)
+    gain = _aic(still) - _aic(best[1])
+    return (*best, gain) if gain >= DECISIVE_AIC else (None, still, gain)
+
+
+def _fit(model: CellModel, views: Views, noise: Noise) -> JointFit:
+    return fit_joint(model, views, unknowns_of(model, PLAIN_OPTICS), noise)
+
+
+def _aic(fit: JointFit) -> float:
+    return fit.minus_two_log + 2 * fit.parameters
+
+
+def _from_hand_eye(hand: HandEye, sigma_px: float, outliers: tuple[int, ...]) -> RobotReference:
+    return RobotReference(
+        mount=hand.mount,
+        flange_from_mounted=hand.flange_from_mounted,
+        base_from_fixed=hand.base_from_fixed,
+        covariance=hand.covariance,
+        flange_sigma_m=hand.rms_m,
+        flange_sigma_rad=hand.rms_rad,
+        corner_sigma_px=sigma_px,
+        law=None,
+        gain_aic=0.0,
+        outliers=outliers,
+        source="hand_eye",
+    )
