@@ -1,0 +1,298 @@
+"""A GigE Vision camera on loopback whose pictures come from any `drivers.camera.Camera`.
+
+What it does of the AIA GigE Vision Specification 2.0: discovery, control privilege with heartbeat
+expiry, register and memory access, test packets, one stream channel with packet size, packet delay
+and resend. What it does not: events, actions, ForceIP, chunks, extended ids, pending acknowledges.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import select
+import socket
+import struct
+import threading
+import time
+from types import TracebackType
+
+from drivers.camera import Camera
+from sim.peers.gige import features as ft
+from sim.peers.gige import gvcp
+from sim.peers.gige.gvcp import Command, Refused, Status
+from sim.peers.gige.gvsp import BITS, probe_packet
+from sim.peers.gige.lens import Lens
+from sim.peers.gige.registers import (
+    CONTROL_PRIVILEGE,
+    DISCOVERY_BYTES,
+    STREAM_ADDRESS,
+    STREAM_PORT,
+    TIMESTAMP_CONTROL,
+    RegisterMap,
+)
+from sim.peers.gige.streamer import Acquisition, Faults, Streamer
+
+_FIRE_TEST_PACKET = 0x80000000
+_LATCH = 0x2
+_EXCLUSIVE_OR_CONTROL = 0x3
+_TICK_S = 1e-9
+
+
+class GigEPeer:
+    """The device; `start` powers it on, `kill` cuts the power, `close` does it politely.
+
+    Parameters
+    ----------
+    source:
+        Where pictures come from; must be connected. Exposure, gain and focus are passed on to it.
+    width, height:
+        Sensor size, pixels; `source` gives pictures of that size.
+    address:
+        Any loopback address (127.0.0.0/8); the control port is always 3956.
+    focus_steps, focus_start, focus_steps_s:
+        Range, start and speed of the lens's stepper.
+    link_bytes_s:
+        Rate of the link; 125e6 is Gigabit Ethernet.
+    answer_discovery_broadcast:
+        Also answer broadcasts, which reach it from other machines too.
+    """
+
+    def __init__(
+        self,
+        source: Camera,
+        width: int,
+        height: int,
+        *,
+        address: str = "127.0.0.1",
+        model: str = "SimulatedCamera",
+        serial: str = "SIM-0001",
+        focus_steps: int = 10000,
+        focus_start: int = 5000,
+        focus_steps_s: float = 20000.0,
+        link_bytes_s: float = 125e6,
+        answer_discovery_broadcast: bool = False,
+        seed: int = 0,
+    ) -> None:
+        if not ipaddress.IPv4Address(address).is_loopback:
+            raise ValueError(f"{address} is no loopback address: this device stays on loopback")
+        self.address, self.faults = address, Faults()
+        self._source, self._size = source, (width, height)
+        self._names = (model, serial)
+        self._focus = (focus_steps, focus_start, focus_steps_s)
+        self._link, self._seed = link_bytes_s, seed
+        self._broadcast = answer_discovery_broadcast
+        self._sockets: list[socket.socket] = []
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> GigEPeer:
+        """Power on: default registers, nobody in control, block ids from one."""
+        steps, start, steps_s = self._focus
+        features = ft.device_features(*self._size, steps, start)
+        self.registers = RegisterMap(features, self.address, *self._names)
+        self.streamer = Streamer(self._source, self.address, self.faults, self._link, self._seed)
+        self._lens = Lens(self._source, self.streamer.order, start, steps_s)
+        self.registers.set_word(0x0D1C, self.streamer.port)
+        self._controller: tuple[str, int] | None = None
+        self._heard_s = 0.0
+        self._sockets = [_bound((self.address, gvcp.PORT))]
+        if self._broadcast:
+            self._sockets.append(_bound(("255.255.255.255", gvcp.PORT)))
+        self._powered = True
+        self._thread = threading.Thread(target=self._serve, daemon=True, name="gige control")
+        self._thread.start()
+        return self
+
+    def kill(self) -> None:
+        """Cut the power: no answer, no packet, no goodbye. Idempotent."""
+        if self._thread is None:
+            return
+        self._powered = False
+        self.streamer.halt()
+        self._thread.join()
+        self._thread = None
+        for each in self._sockets:
+            each.close()
+        self.streamer.close()
+
+    close = kill
+
+    def __enter__(self) -> GigEPeer:
+        return self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def controlled_by(self) -> tuple[str, int] | None:
+        """Address and port of the program that holds the control privilege."""
+        return self._controller
+
+    def _serve(self) -> None:
+        while self._powered:
+            ready, _, _ = select.select(self._sockets, [], [], 0.02)
+            for each in ready:
+                packet, host = each.recvfrom(2048)
+                request = gvcp.parse(packet)
+                if request and not self.faults.mute:
+                    self._answer(request, host)
+            self._expire_heartbeat()
+
+    def _answer(self, request: gvcp.Request, host: tuple[str, int]) -> None:
+        if host == self._controller:
+            self._heard_s = time.monotonic()
+        try:
+            answer = gvcp.acknowledge(request, self._do(request, host))
+        except Refused as refusal:
+            answer = gvcp.acknowledge(request, status=refusal.status)
+        except struct.error:
+            answer = gvcp.acknowledge(request, status=Status.INVALID_PARAMETER)
+        if request.wants_answer:
+            time.sleep(self.faults.answer_delay_s)
+            with contextlib.suppress(OSError):
+                self._sockets[0].sendto(answer, host)
+
+    def _do(self, request: gvcp.Request, host: tuple[str, int]) -> bytes:
+        payload = request.payload
+        match request.command:
+            case Command.DISCOVERY:
+                return self.registers.read(0, DISCOVERY_BYTES)
+            case Command.READ_REGISTER:
+                return b"".join(self._read(at, 4) for (at,) in struct.iter_unpack(">I", payload))
+            case Command.READ_MEMORY:
+                at, _, count = struct.unpack(">IHH", payload)
+                return payload[:4] + self._read(at, count)
+            case Command.WRITE_REGISTER:
+                pairs = list(struct.iter_unpack(">I4s", payload))
+                for at, data in pairs:
+                    self._write(at, data, host)
+                return struct.pack(">HH", 0, len(pairs))
+            case Command.WRITE_MEMORY:
+                self._write(struct.unpack_from(">I", payload)[0], payload[4:], host)
+                return struct.pack(">HH", 0, len(payload) - 4)
+            case Command.PACKET_RESEND:
+                self.streamer.resend(*gvcp.resend_range(payload))
+                return b""
+        raise Refused(Status.NOT_IMPLEMENTED)
+
+    def _read(self, address: int, length: int) -> bytes:
+        name = self.registers.name_at(address)
+        if name in ("OpticControllerStatus", "FocusStatus"):
+            self.registers.set(name, self._lens.status)
+        elif name == "FocusStepper":
+            self.registers.set(name, self._lens.step)
+        return self.registers.read(address, length)
+
+    def _write(self, address: int, data: bytes, host: tuple[str, int]) -> None:
+        if address == CONTROL_PRIVILEGE:
+            return self._claim(int.from_bytes(data, "big"), host)
+        if host != self._controller:
+            raise Refused(Status.ACCESS_DENIED)
+        feature, value = self.registers.feature_at(address, data)
+        if feature is None:
+            return self._write_bootstrap(address, int(value))
+        if feature.locked_while_streaming and self.streamer.acquiring:
+            raise Refused(Status.ACCESS_DENIED)
+        if feature.kind != "command":
+            self.registers.set(feature.name, value)
+        self._react(feature.name, value)
+        return None
+
+    def _claim(self, privilege: int, host: tuple[str, int]) -> None:
+        if self._controller not in (None, host):
+            raise Refused(Status.ACCESS_DENIED)
+        self._controller = host if privilege & _EXCLUSIVE_OR_CONTROL else None
+        self._heard_s = time.monotonic()
+        self.registers.set_word(CONTROL_PRIVILEGE, privilege)
+        if self._controller is None:
+            self.streamer.halt()
+
+    def _expire_heartbeat(self) -> None:
+        timeout_s = self.registers.word(ft.HEARTBEAT_TIMEOUT) / 1000
+        if self._controller and time.monotonic() - self._heard_s > timeout_s:
+            self._controller = None
+            self.registers.set_word(CONTROL_PRIVILEGE, 0)
+            self.streamer.halt()
+
+    def _write_bootstrap(self, address: int, value: int) -> None:
+        if address == TIMESTAMP_CONTROL and value & _LATCH:
+            self.registers.latch_time(self.streamer.clock_ns())
+        elif address == ft.STREAM_PACKET_SIZE:
+            self.registers.set_word(address, value & 0xFFFF)
+            if value & _FIRE_TEST_PACKET:
+                self.streamer.send_raw(probe_packet(value & 0xFFFF), self._stream_host())
+        else:
+            self.registers.set_word(address, value)
+
+    def _react(self, name: str, value: ft.Value) -> None:
+        match name:
+            case "AcquisitionStart":
+                self.streamer.start(self._acquisition())
+            case "AcquisitionStop":
+                self.streamer.halt()
+            case "TriggerSoftware":
+                self._trigger()
+            case "ExposureTime" | "Gain":
+                self._configure_source()
+            case "Width" | "Height" | "PixelFormat":
+                self._update_payload_size()
+            case "FocusStepper":
+                self._lens.move_to(int(value))
+            case "FocusAuto" if value:
+                self._lens.focus_once()
+                self.registers.set("FocusAuto", 0)
+            case "OpticControllerInitialize" | "FocusInitialize":
+                self._lens.initialize()
+
+    def _trigger(self) -> None:
+        triggered, by_software = (
+            self.registers.get("TriggerMode"),
+            not self.registers.get("TriggerSource"),
+        )
+        if triggered and by_software:
+            self.streamer.trigger()
+
+    def _configure_source(self) -> None:
+        exposure_s = self.registers.number("ExposureTime") * 1e-6
+        gain_db = self.registers.number("Gain")
+        self.streamer.set_exposure(exposure_s)
+        self.streamer.order(
+            lambda: _ignore(self._source.configure(exposure_s=exposure_s, gain_db=gain_db))
+        )
+
+    def _update_payload_size(self) -> None:
+        reg = self.registers
+        bits = BITS[int(reg.number("PixelFormat"))]
+        reg.set("PayloadSize", int(reg.number("Width") * reg.number("Height")) * bits // 8)
+
+    def _stream_host(self) -> tuple[str, int]:
+        ip = ipaddress.IPv4Address(self.registers.word(STREAM_ADDRESS))
+        return str(ip), self.registers.word(STREAM_PORT) & 0xFFFF
+
+    def _acquisition(self) -> Acquisition:
+        reg = self.registers
+        triggered = bool(reg.get("TriggerMode"))
+        return Acquisition(
+            host=self._stream_host(),
+            packet_bytes=reg.word(ft.STREAM_PACKET_SIZE) & 0xFFFF,
+            packet_delay_s=reg.word(ft.STREAM_PACKET_DELAY) * _TICK_S,
+            pixel_format=int(reg.number("PixelFormat")),
+            width=int(reg.number("Width")),
+            height=int(reg.number("Height")),
+            exposure_s=reg.number("ExposureTime") * 1e-6,
+            period_s=None if triggered else 1 / reg.number("AcquisitionFrameRate"),
+            single_frame=bool(reg.get("AcquisitionMode")),
+        )
+
+
+def _bound(address: tuple[str, int]) -> socket.socket:
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    if address[0] == "255.255.255.255":
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    made.bind(address)
+    return made
+
+
+def _ignore(_: object) -> None:
+    """Drop a result."""
