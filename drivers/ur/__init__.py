@@ -1,0 +1,6 @@
+"""Universal Robots arms."""
+
+from drivers.ur.arm import URArm
+from drivers.ur.settings import URSettings
+
+__all__ = ["URArm", "URSettings"]

@@ -1,0 +1,245 @@
+"""A Universal Robots arm (CB3 from 3.12, e-Series from 5.5.1; PolyScope 3 and 5)."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from drivers.arm import ArmState, Motion, MoveTarget
+from drivers.errors import (
+    ArmStopped,
+    DeviceError,
+    DeviceRefused,
+    DeviceUnreachable,
+    SafetyError,
+    StopFailed,
+)
+from drivers.targets import check_target
+from drivers.untried import warn_untried
+from drivers.ur.dashboard import Dashboard
+from drivers.ur.kinematics_info import KinematicsInfo, read_kinematics
+from drivers.ur.motion import MoveOrder
+from drivers.ur.pose import base_from_flange, base_from_tcp, pose_of
+from drivers.ur.reader import Packet, RtdeReader
+from drivers.ur.settings import URSettings
+from drivers.ur.speed import leading_joint_speed_rad_s, tcp_speed_m_s
+from drivers.ur.status import fault_in
+from drivers.ur.supervisor import Supervisor, at_rest
+
+_JOINT_LIMIT_RAD = 6.3
+_UNLOCK_CONFIRM_S = 2.0
+
+
+class URArm:
+    """Moves through ur-rtde in a process of its own; reads poses and stops by itself.
+
+    Parameters
+    ----------
+    host:
+        The controller's address.
+    settings:
+        See `URSettings`.
+    """
+
+    tried_on_hardware = False
+
+    def __init__(self, host: str, settings: URSettings | None = None) -> None:
+        self._host = host
+        self._settings = settings or URSettings()
+        self._reader = RtdeReader(
+            host, rate_hz=self._settings.rate_hz, silence_s=self._settings.silence_s
+        )
+        self._supervisor: Supervisor | None = None
+        self.identity: dict[str, str] = {}
+        self.kinematics: KinematicsInfo | None = None
+
+    def connect(self) -> None:
+        """Open every link, check that the arm may be driven, and start the control script.
+
+        Raises
+        ------
+        DeviceUnreachable
+            No answer from one of the controller's ports.
+        DeviceRefused
+            Local mode, registers held by another client, PolyScope too old.
+        ArmStopped
+            Powered off, or stopped for safety.
+        """
+        self.close()
+        warn_untried(f"Universal Robots arm at {self._host}", "a simulated controller on loopback")
+        self._identify()
+        self._reader.connect()
+        try:
+            self._start()
+        except Exception:
+            self.close()
+            raise
+
+    def state(self) -> ArmState:
+        """Return the newest packet, with the flange's pose freed of the tool offset.
+
+        Raises `DeviceUnreachable` when it is stale, `StopFailed` when a stop was not confirmed.
+        """
+        packet = self._reader.newest()
+        supervisor = self._connected()
+        if supervisor.stop_failed is not None:
+            raise StopFailed(self._named(f"{supervisor.stop_failed}. Press the emergency stop"))
+        return ArmState(
+            host_t_s=packet.host_t_s,
+            controller_t_s=packet.number("timestamp"),
+            joints_rad=packet.vector("actual_q"),
+            joint_velocity_rad_s=packet.vector("actual_qd"),
+            base_from_flange=base_from_flange(
+                packet.vector("actual_TCP_pose"), packet.vector("tcp_offset")
+            ),
+            motion=_motion(supervisor, packet),
+            fault=supervisor.fault,
+            raw=self._raw(packet),
+        )
+
+    def start_move(self, target: MoveTarget) -> None:
+        """Begin a move; see `drivers.arm.Arm`. Joint targets go by moveJ, poses by moveL."""
+        settings = self._settings
+        check_target(
+            target,
+            max_joint_speed_rad_s=settings.max_joint_speed_rad_s,
+            max_tcp_speed_m_s=settings.max_tcp_speed_m_s,
+            joint_limits_rad=((-_JOINT_LIMIT_RAD, _JOINT_LIMIT_RAD),) * 6,
+        )
+        packet = self._reader.newest()
+        supervisor = self._connected()
+        if supervisor.fault is not None:
+            raise ArmStopped(self._named(supervisor.fault))
+        if supervisor.busy or not at_rest(packet):
+            raise SafetyError(
+                self._named("still moving: wait until it is steady, or stop it first")
+            )
+        supervisor.order(self._order(target, packet))
+
+    def stop(self) -> None:
+        """Stop on two paths that do not pass through ur-rtde; see `drivers.ur.stop_paths`."""
+        supervisor = self._supervisor
+        if supervisor is not None and not supervisor.stop():
+            raise StopFailed(
+                self._named(
+                    "neither the dashboard nor the script port took the stop. The controller's "
+                    "watchdog should have stopped the arm; make sure, at the emergency stop"
+                )
+            )
+
+    def recover(self) -> None:
+        """Release a protective stop, when the operator has cleared its cause.
+
+        The interrupted program is stopped first, so that nothing drives on. Raises `DeviceRefused`
+        with the controller's own words, for instance within five seconds of the stop.
+        """
+        supervisor = self._connected()
+        self.stop()
+        dashboard = Dashboard(self._host)
+        try:
+            dashboard.ask("stop")
+            dashboard.ask("close safety popup")
+            answer = dashboard.ask("unlock protective stop")
+        finally:
+            dashboard.close()
+        if not answer.startswith("Protective stop releasing"):
+            raise DeviceRefused(self._named(answer))
+        self._await_no_fault()
+        supervisor.clear()
+        supervisor.prepare()
+        self._wait_ready(supervisor)
+
+    def close(self) -> None:
+        """Stop and let go of the controller. Idempotent."""
+        if self._supervisor is not None:
+            self._supervisor.close()
+            self._supervisor = None
+        self._reader.close()
+
+    def _identify(self) -> None:
+        dashboard = Dashboard(self._host)
+        try:
+            questions = {"polyscope": "PolyscopeVersion", "model": "get robot model"}
+            self.identity = {key: dashboard.ask(line) for key, line in questions.items()}
+            self.identity["serial"] = dashboard.ask("get serial number")
+            # CB3 and the simulator before 5.6 do not know the question
+            if dashboard.ask("is in remote control") == "false":
+                raise DeviceRefused(
+                    self._named(
+                        "is in local mode, where it ignores programs from outside: switch to "
+                        "Remote Control at the top right of the teach pendant"
+                    )
+                )
+        finally:
+            dashboard.close()
+
+    def _start(self) -> None:
+        fault = fault_in(self._reader.newest())
+        if fault is not None:
+            raise ArmStopped(self._named(fault))
+        self.kinematics = read_kinematics(self._host)
+        self._supervisor = Supervisor(self._host, self._settings, self._reader)
+        self._supervisor.prepare()
+        self._wait_ready(self._supervisor)
+
+    def _wait_ready(self, supervisor: Supervisor) -> None:
+        try:
+            supervisor.wait_ready(self._settings.start_timeout_s)
+        except DeviceError as error:
+            raise self._explained(str(error)) from None
+
+    def _explained(self, why: str) -> DeviceError:
+        if "already in use" in why:
+            return DeviceRefused(
+                self._named(
+                    "another client or a fieldbus holds the RTDE input registers. Disable "
+                    "EtherNet/IP, PROFINET or MODBUS on the robot, close the other program, or set "
+                    "upper_registers"
+                )
+            )
+        if "remote control" in why:
+            return DeviceRefused(self._named(why))
+        if "No module named" in why:
+            return DeviceRefused(self._named(f"{why}: pip install 'calibration-cell[ur]'"))
+        return DeviceUnreachable(self._named(f"cannot start the control script: {why}"))
+
+    def _await_no_fault(self) -> None:
+        deadline = time.monotonic() + _UNLOCK_CONFIRM_S
+        while (fault := fault_in(self._reader.newest())) is not None:
+            if time.monotonic() > deadline:
+                raise DeviceRefused(self._named(f"does not leave its stop: {fault}"))
+            time.sleep(0.02)
+
+    def _order(self, target: MoveTarget, packet: Packet) -> MoveOrder:
+        settings = self._settings
+        if target.joints_rad is not None:
+            speed = leading_joint_speed_rad_s(packet.vector("actual_q"), target, self.kinematics)
+            return MoveOrder(
+                "move_j", tuple(target.joints_rad), speed, settings.joint_acceleration_rad_s2
+            )
+        assert target.base_from_flange is not None
+        offset = packet.vector("tcp_offset")
+        begin = base_from_flange(packet.vector("actual_TCP_pose"), offset)
+        goal = pose_of(base_from_tcp(target.base_from_flange, offset))
+        speed = tcp_speed_m_s(begin, target, offset)
+        return MoveOrder("move_l", goal, speed, settings.tcp_acceleration_m_s2)
+
+    def _raw(self, packet: Packet) -> dict[str, Any]:
+        raw: dict[str, Any] = dict(packet.values)
+        if self.kinematics is not None:
+            raw["kinematics_checksum"] = self.kinematics.checksum
+        return raw
+
+    def _connected(self) -> Supervisor:
+        if self._supervisor is None:
+            raise DeviceUnreachable(self._named("not connected"))
+        return self._supervisor
+
+    def _named(self, what: str) -> str:
+        return f"UR arm {self._host}: {what}"
+
+
+def _motion(supervisor: Supervisor, packet: Packet) -> Motion:
+    if supervisor.fault is not None:
+        return Motion.STOPPED_BY_FAULT
+    return Motion.MOVING if supervisor.busy or not at_rest(packet) else Motion.STEADY

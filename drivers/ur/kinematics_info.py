@@ -1,0 +1,117 @@
+"""The controller's own kinematics: its factory-calibrated Denavit-Hartenberg parameters.
+
+Source: Universal Robots, "Remote Control Via TCP/IP", primary client interface, port 30001: robot
+state package (type 16), sub-package 5. Calibrated a and d may be hundreds of metres long where
+axes are almost parallel: they are parameters of the chain, not lengths of links.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+PRIMARY_PORT = 30001
+_ROBOT_STATE, _KINEMATICS = 16, 5
+_HEADER = struct.Struct(">IB")
+_BODY = struct.Struct(">6I6d6d6d6dI")
+_STATUS = {0: "not initialised", 1: "not linearised", 2: "linearised"}
+_LONGEST_PACKAGE = 1 << 20
+
+
+@dataclass(frozen=True)
+class KinematicsInfo:
+    """Denavit-Hartenberg parameters of the six joints, as the controller uses them.
+
+    Attributes
+    ----------
+    theta_rad, a_m, d_m, alpha_rad:
+        Six each, standard convention.
+    checksum:
+        The controller's six checksums; they tell one arm from another.
+    calibration_status:
+        ``linearised`` where a factory calibration is in force.
+    """
+
+    theta_rad: tuple[float, ...]
+    a_m: tuple[float, ...]
+    d_m: tuple[float, ...]
+    alpha_rad: tuple[float, ...]
+    checksum: tuple[int, ...]
+    calibration_status: str
+
+    def flange_positions_m(self, joints_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return (N, 3) flange positions in the base for (N, 6) joint angles."""
+        pose = np.broadcast_to(np.eye(4), (len(joints_rad), 4, 4))
+        for i in range(6):
+            pose = pose @ self._link(i, joints_rad[:, i])
+        return np.asarray(pose[:, :3, 3])
+
+    def _link(self, i: int, joint_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+        angle = joint_rad + self.theta_rad[i]
+        c, s = np.cos(angle), np.sin(angle)
+        ca, sa = np.cos(self.alpha_rad[i]), np.sin(self.alpha_rad[i])
+        link = np.zeros((len(angle), 4, 4))
+        link[:, 0, :] = np.stack([c, -s * ca, s * sa, self.a_m[i] * c], axis=-1)
+        link[:, 1, :] = np.stack([s, c * ca, -c * sa, self.a_m[i] * s], axis=-1)
+        link[:, 2, 1:] = sa, ca, self.d_m[i]
+        link[:, 3, 3] = 1.0
+        return link
+
+
+def read_kinematics(host: str, timeout_s: float = 1.0) -> KinematicsInfo | None:
+    """Return what the primary port tells, or None where it tells nothing within the time-out."""
+    deadline = time.monotonic() + timeout_s
+    try:
+        with socket.create_connection((host, PRIMARY_PORT), timeout_s) as link:
+            while (left_s := deadline - time.monotonic()) > 0:
+                link.settimeout(left_s)
+                found = _find(_package(link))
+                if found is not None:
+                    return found
+    except (OSError, struct.error):
+        return None
+    return None
+
+
+def _package(link: socket.socket) -> tuple[int, bytes]:
+    size, kind = _HEADER.unpack(_exactly(link, _HEADER.size))
+    if not _HEADER.size <= size <= _LONGEST_PACKAGE:
+        raise ConnectionError(f"a package claims a size of {size} bytes")
+    return kind, _exactly(link, size - _HEADER.size)
+
+
+def _exactly(link: socket.socket, count: int) -> bytes:
+    data = link.recv(count, socket.MSG_WAITALL)
+    while len(data) < count:
+        chunk = link.recv(count - len(data))
+        if not chunk:
+            raise ConnectionError("connection closed")
+        data += chunk
+    return data
+
+
+def _find(package: tuple[int, bytes]) -> KinematicsInfo | None:
+    kind, body = package
+    if kind != _ROBOT_STATE:
+        return None
+    at = 0
+    while at + _HEADER.size <= len(body):
+        size, part = _HEADER.unpack_from(body, at)
+        if part == _KINEMATICS:
+            return _decode(body[at + _HEADER.size : at + size])
+        if size < _HEADER.size:
+            return None
+        at += size
+    return None
+
+
+def _decode(body: bytes) -> KinematicsInfo:
+    values = _BODY.unpack_from(body)
+    theta, a, d, alpha = (values[i : i + 6] for i in range(6, 30, 6))
+    status = _STATUS.get(values[30], f"status {values[30]}")
+    return KinematicsInfo(theta, a, d, alpha, values[:6], status)

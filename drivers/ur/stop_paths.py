@@ -1,0 +1,96 @@
+"""Two ways to stop the arm that do not pass through ur-rtde.
+
+1. ``stop`` on the dashboard server ends the program, on a connection that is kept open.
+2. A program of one line, ``stopj``, sent to the script port takes the place of the program that
+   runs. Its connection is made anew each time: one made while the robot was in local mode stays
+   read-only for ever, and the port streams robot states that nobody here would read.
+
+Either is enough. Each is given a fixed share of time, so that a dead controller cannot hold up the
+caller.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+
+from drivers.ur.dashboard import DASHBOARD_PORT
+
+SCRIPT_PORT = 30003
+_CONNECT_S = 0.02
+
+
+class StopPaths:
+    """The two ways; `order` may be called from any thread, as often as one likes.
+
+    Parameters
+    ----------
+    host:
+        The controller's address.
+    deceleration_rad_s2:
+        Of the leading axis, for the script's ``stopj``.
+    """
+
+    def __init__(self, host: str, deceleration_rad_s2: float) -> None:
+        self._host = host
+        self._script = f"stopj({deceleration_rad_s2:.3f})\n".encode()
+        self._dashboard: socket.socket | None = None
+        self._lock = threading.Lock()
+
+    def open(self) -> None:
+        """Open the connection that is kept, so that a stop need not wait for it."""
+        with self._lock, contextlib.suppress(OSError):
+            self._reopen()
+
+    def order(self) -> list[str]:
+        """Send the stop on both ways; return the names of those that took it. Never raises."""
+        with self._lock:
+            ways = {"dashboard": self._by_dashboard, "script port": self._by_script}
+            return [name for name, send in ways.items() if _sent(send)]
+
+    def close(self) -> None:
+        """Let go of the controller."""
+        with self._lock:
+            self._drop()
+
+    def _by_dashboard(self) -> None:
+        if not self._alive():
+            self._reopen()
+        assert self._dashboard is not None
+        self._dashboard.sendall(b"stop\n")
+
+    def _by_script(self) -> None:
+        with socket.create_connection((self._host, SCRIPT_PORT), _CONNECT_S) as link:
+            link.sendall(self._script)
+
+    def _alive(self) -> bool:
+        """Whether the kept connection is open; drains the answers, which nobody needs."""
+        if self._dashboard is None:
+            return False
+        try:
+            while self._dashboard.recv(4096, socket.MSG_DONTWAIT):
+                pass
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        return False
+
+    def _reopen(self) -> None:
+        self._drop()
+        self._dashboard = socket.create_connection((self._host, DASHBOARD_PORT), _CONNECT_S)
+
+    def _drop(self) -> None:
+        if self._dashboard is not None:
+            self._dashboard.close()
+        self._dashboard = None
+
+
+def _sent(send: object) -> bool:
+    assert callable(send)
+    try:
+        send()
+    except OSError:
+        return False
+    return True

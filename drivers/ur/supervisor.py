@@ -1,0 +1,245 @@
+"""The thread that keeps the arm in check: starts the child, watches the state, stops on a fault.
+
+::
+
+    no order ── order() ──> ordered ──> moving ──> done, at rest, at the target ──> no order
+        │                      │           │
+        └── fault, lost link, stop() ──────┴──> stop on both paths, child killed, at rest?
+                                                   └── not within a second: `stop_failed`
+
+After a stop the control script is gone from the controller. It is loaded again by the next order
+and never before, so nothing can drive on by itself.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+
+from drivers.errors import DeviceError, DeviceUnreachable
+from drivers.ur.motion import ChildOptions, MotionChild, MoveOrder, Phase
+from drivers.ur.pose import transform_of
+from drivers.ur.reader import Packet, RtdeReader
+from drivers.ur.remote import RemoteWatch
+from drivers.ur.settings import URSettings
+from drivers.ur.status import Runtime, fault_in
+from drivers.ur.stop_paths import StopPaths
+
+AT_REST_RAD_S = 0.005
+_CYCLE_S = 0.01
+_BEAT_S = 0.2
+_RESEND_S = 0.05
+_STOP_CONFIRM_S = 1.0
+_ACCEPT_S = 1.0
+_PROGRAM_GRACE_S = 0.1
+_ARRIVED_RAD, _ARRIVED_M = 0.01, 0.002
+
+
+def at_rest(packet: Packet) -> bool:
+    """Whether every joint stands, judged by the controller's own measured speeds."""
+    return max(map(abs, packet.vector("actual_qd"))) < AT_REST_RAD_S
+
+
+class Supervisor:
+    """Owns the child, the stop paths and the current order of one arm.
+
+    Attributes
+    ----------
+    fault:
+        None, or what stopped the arm; set until `clear`.
+    stop_failed:
+        None, or why it is not known that the arm stopped when it was told to.
+    """
+
+    def __init__(self, host: str, settings: URSettings, reader: RtdeReader) -> None:
+        self._reader = reader
+        self._settings = settings
+        self._options = ChildOptions(
+            host,
+            settings.rate_hz,
+            settings.upper_registers,
+            settings.watchdog_hz,
+            settings.heartbeat_s,
+        )
+        self._stops = StopPaths(host, settings.stop_deceleration_rad_s2)
+        self._stops.open()
+        self._remote = RemoteWatch(host)
+        self._lock = threading.RLock()
+        self._closing = threading.Event()
+        self._child: MotionChild | None = None
+        self._child_wanted = False
+        self._order: MoveOrder | None = None
+        self._order_sent = False
+        self._playing_s = time.monotonic()
+        self._beat_s = 0.0
+        self._stop_s: float | None = None
+        self._resent_s = 0.0
+        self.fault: str | None = None
+        self.stop_failed: str | None = None
+        self._thread = threading.Thread(target=self._run, name="ur-supervisor", daemon=True)
+        self._thread.start()
+
+    @property
+    def busy(self) -> bool:
+        """Whether an order, or a stop, has not come to its end."""
+        return self._order is not None or self._stop_s is not None
+
+    @property
+    def ready(self) -> bool:
+        """Whether the control script runs and waits for an order."""
+        child = self._child
+        return child is not None and child.phase is Phase.READY
+
+    def prepare(self) -> None:
+        """Have the control script started."""
+        with self._lock:
+            self._child_wanted = True
+
+    def order(self, order: MoveOrder) -> None:
+        """Take an order; the thread passes it on."""
+        with self._lock:
+            self._order, self._order_sent = order, False
+
+    def stop(self) -> list[str]:
+        """Stop the arm; return the names of the paths that took the order."""
+        ways = self._stops.order()
+        with self._lock:
+            if self._cancel() and ways:
+                # whatever the child still had sent out may have come in after the first stop
+                ways = self._stops.order() or ways
+        return ways
+
+    def clear(self) -> None:
+        """Forget a fault that the operator has mended."""
+        with self._lock:
+            self.fault = self.stop_failed = None
+
+    def close(self) -> None:
+        """Stop the arm and end the thread."""
+        self._closing.set()
+        if self._thread is not threading.current_thread():
+            self._thread.join(timeout=2.0)
+        self.stop()
+        self._remote.close()
+        self._stops.close()
+
+    def _cancel(self) -> bool:
+        """Forget the order and kill the child; returns whether there was one."""
+        child, self._child = self._child, None
+        self._child_wanted = False
+        self._order = None
+        self._stop_s = self._resent_s = time.monotonic()
+        if child is not None:
+            child.kill()
+        return child is not None
+
+    def _run(self) -> None:
+        while not self._closing.wait(_CYCLE_S):
+            try:
+                packet = self._reader.newest()
+                with self._lock:
+                    self._watch(packet)
+            except DeviceUnreachable as error:
+                self._trip(str(error))
+            except Exception as error:
+                # nobody would watch the arm any more: whatever it is, stop first
+                self._trip(f"the driver's supervision failed: {error!r}")
+
+    def _watch(self, packet: Packet) -> None:
+        fault = fault_in(packet) or self._remote.fault or self._child_fault(packet)
+        if fault is not None:
+            self._trip(fault)
+        self._see_stop_through(packet)
+        if self.fault is None and self._stop_s is None:
+            self._drive(packet)
+
+    def _trip(self, fault: str) -> None:
+        if self.fault is None:
+            self.fault = fault
+            self.stop()
+
+    def _see_stop_through(self, packet: Packet) -> None:
+        if self._stop_s is None:
+            return
+        now = time.monotonic()
+        if at_rest(packet) and packet.host_t_s > self._stop_s:
+            self._stop_s = self.stop_failed = None
+        elif now - self._stop_s > _STOP_CONFIRM_S:
+            self.stop_failed = (
+                f"the arm still moves {_STOP_CONFIRM_S:g} s after it was told to stop"
+            )
+        if self._stop_s is not None and now - self._resent_s > _RESEND_S:
+            self._stops.order()
+            self._resent_s = now
+
+    def _child_fault(self, packet: Packet) -> str | None:
+        child = self._child
+        if child is None:
+            return None
+        if child.phase is Phase.FAILED:
+            return child.why
+        if child.phase is Phase.STARTING:
+            slow = child.in_phase_s > self._settings.start_timeout_s
+            return "the control script did not start in time" if slow else None
+        if child.phase is Phase.ORDERED and child.in_phase_s > _ACCEPT_S:
+            return "the controller did not take the motion in time"
+        return self._program_fault(packet)
+
+    def _program_fault(self, packet: Packet) -> str | None:
+        runtime = Runtime(int(packet.number("runtime_state")))
+        if runtime is Runtime.PLAYING:
+            self._playing_s = time.monotonic()
+        if time.monotonic() - self._playing_s < _PROGRAM_GRACE_S:
+            return None
+        return (
+            f"the control program on the robot is {runtime.name.lower()}: somebody stopped it at "
+            "the teach pendant, another client took its place, or the watchdog ended it"
+        )
+
+    def _drive(self, packet: Packet) -> None:
+        if self._child is None:
+            if self._child_wanted or self._order is not None:
+                self._child = MotionChild(self._options)
+            return
+        self._beat()
+        if self._child.phase is not Phase.READY or self._order is None:
+            if self._child.phase is Phase.STARTING:
+                self._playing_s = time.monotonic()
+            return
+        if not self._order_sent:
+            self._child.move(self._order)
+            self._order_sent = True
+        elif at_rest(packet):
+            order, self._order = self._order, None
+            missed = _missed(order, packet)
+            if missed is not None:
+                self._trip(missed)
+
+    def _beat(self) -> None:
+        if self._child is not None and time.monotonic() - self._beat_s > _BEAT_S:
+            self._child.beat()
+            self._beat_s = time.monotonic()
+
+    def wait_ready(self, timeout_s: float) -> None:
+        """Wait until the control script runs; raises `DeviceError` when it does not."""
+        deadline = time.monotonic() + timeout_s
+        while not self.ready:
+            if self.fault is not None:
+                raise DeviceError(self.fault)
+            if time.monotonic() > deadline:
+                raise DeviceError("the control script did not start in time")
+            time.sleep(_CYCLE_S)
+
+
+def _missed(order: MoveOrder, packet: Packet) -> str | None:
+    """Return how far from its target the motion ended, or None where it arrived."""
+    if order.order == "move_j":
+        off_rad = np.abs(np.subtract(packet.vector("actual_q"), order.target)).max()
+        return f"the motion ended {off_rad:.3f} rad off" if off_rad > _ARRIVED_RAD else None
+    off = transform_of(packet.vector("actual_TCP_pose")).inv() * transform_of(order.target)
+    off_m, off_rad = float(np.linalg.norm(off.translation)), float(off.rotation.magnitude())
+    if off_m > _ARRIVED_M or off_rad > _ARRIVED_RAD:
+        return f"the motion ended {off_m * 1e3:.1f} mm and {off_rad:.3f} rad off"
+    return None

@@ -1,0 +1,286 @@
+"""A Universal Robots e-Series controller that speaks its own protocols on loopback.
+
+Ports (those of the real controller): 29999 dashboard, 30001 primary, 30003 script, 30004 RTDE.
+Clients of the real robot hard-code them, so every simulated controller gets an address of its own,
+127.0.0.2 and up (127.0.0.1 is left alone: ur-rtde skips its remote-control check there).
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+from enum import IntEnum
+
+from drivers.arm import Arm, ArmState, Motion, MoveTarget
+from drivers.errors import DeviceError, SafetyError
+from drivers.ur.pose import base_from_tcp, pose_of
+from drivers.ur.wire import RTDE_PORT, Value
+from sim.peers.ur.dashboard import DashboardServer
+from sim.peers.ur.listener import Listener
+from sim.peers.ur.primary import PrimaryServer
+from sim.peers.ur.program import ControlProgram
+from sim.peers.ur.rtde import RtdeServer
+from sim.peers.ur.script import ScriptServer
+
+DASHBOARD_PORT, PRIMARY_PORT, SCRIPT_PORT = 29999, 30001, 30003
+UNLOCK_WAIT_S = 5.0
+
+
+class Runtime(IntEnum):
+    """RTDE's ``runtime_state``."""
+
+    STOPPED = 1
+    PLAYING = 2
+    PAUSED = 4
+
+
+class Robot(IntEnum):
+    """RTDE's ``robot_mode``."""
+
+    POWER_OFF = 3
+    IDLE = 5
+    RUNNING = 7
+
+
+class Safety(IntEnum):
+    """RTDE's ``safety_status_bits``."""
+
+    NORMAL = 1 << 0
+    PROTECTIVE_STOP = 1 << 2
+    EMERGENCY_STOP = (1 << 6) | (1 << 7)
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that reached the controller, on the host's monotonic clock."""
+
+    t_s: float
+    what: str
+
+
+class URController:
+    """The controller of one simulated arm; a context manager that opens and closes its ports.
+
+    Parameters
+    ----------
+    arm:
+        The arm it moves, in process.
+    address:
+        A loopback address of its own.
+    dh:
+        Denavit-Hartenberg parameters as (theta, a, d, alpha), six numbers each, which the primary
+        port reports as the factory calibration; None to report none.
+    rate_hz:
+        Cycle of the control loop and highest RTDE rate.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        address: str = "127.0.0.2",
+        *,
+        dh: tuple[tuple[float, ...], ...] | None = None,
+        rate_hz: float = 125.0,
+    ) -> None:
+        self.arm = arm
+        self.address = address
+        self.dh = dh
+        self.rate_hz = rate_hz
+        self.version = (5, 12, 6, 1102099)
+        self.tcp_offset: tuple[float, ...] = (0.0,) * 6
+        self.remote_control = True
+        self.reserved_inputs: frozenset[str] = frozenset()
+        self.mute = False
+        self.deaf = False
+        self.registers: dict[str, int | float] = {}
+        self.events: list[Event] = []
+        self.robot_mode = Robot.RUNNING
+        self.safety = Safety.NORMAL
+        self.runtime = Runtime.STOPPED
+        self._program: ControlProgram | None = None
+        self._target: MoveTarget | None = None
+        self._protective_stop_s = -UNLOCK_WAIT_S
+        self._lock = threading.RLock()
+        self._stopping = threading.Event()
+        self._ports: list[Listener] = []
+
+    def __enter__(self) -> URController:
+        self.arm.connect()
+        self._rtde = RtdeServer(self)
+        servers = {
+            DASHBOARD_PORT: DashboardServer(self).serve,
+            PRIMARY_PORT: PrimaryServer(self).serve,
+            SCRIPT_PORT: ScriptServer(self).serve,
+            RTDE_PORT: self._rtde.serve,
+        }
+        for port, serve in servers.items():
+            self._ports.append(Listener((self.address, port), serve))
+        self._loop = threading.Thread(target=self._run, name="ur-controller", daemon=True)
+        self._loop.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.kill()
+        self._loop.join(timeout=2.0)
+
+    # ---- what a test orders ------------------------------------------------------------------
+
+    def protective_stop(self) -> None:
+        """Trip on a collision: the arm stops, the program is paused and stays loaded."""
+        with self._lock:
+            self.safety = Safety.PROTECTIVE_STOP
+            self._protective_stop_s = self.now()
+            if self.runtime is Runtime.PLAYING:
+                self.runtime = Runtime.PAUSED
+            self.halt("protective stop")
+
+    def emergency_stop(self) -> None:
+        """Somebody hits the red button: power off, program gone."""
+        with self._lock:
+            self.safety = Safety.EMERGENCY_STOP
+            self.robot_mode = Robot.POWER_OFF
+            self.stop_program("emergency stop")
+
+    def drop(self) -> None:
+        """Close every connection and keep accepting."""
+        for port in self._ports:
+            port.drop()
+
+    def cut(self) -> None:
+        """Pull the network cable: nothing passes in either direction, no socket is closed."""
+        self.mute = self.deaf = True
+
+    def kill(self) -> None:
+        """The controller dies: ports closed, brakes fall in."""
+        self._stopping.set()
+        for port in self._ports:
+            port.close()
+        self.halt("controller killed")
+
+    # ---- what its ports order ----------------------------------------------------------------
+
+    @staticmethod
+    def now() -> float:
+        """Host clock in seconds."""
+        return time.monotonic()
+
+    def note(self, what: str) -> None:
+        """Remember that something arrived."""
+        self.events.append(Event(self.now(), what))
+
+    def load(self, source: str) -> None:
+        """A program came in on a script port: it takes the place of the one that runs."""
+        with self._lock:
+            self.stop_program("replaced by another program")
+            if self.safety is not Safety.NORMAL or self.robot_mode is not Robot.RUNNING:
+                return
+            if "def rtde_control():" in source:
+                self._program = ControlProgram(self, source)
+                self.runtime = Runtime.PLAYING
+
+    def play(self) -> bool:
+        """Resume a paused program, with the motion that it was in."""
+        with self._lock:
+            if self.runtime is not Runtime.PAUSED or self.safety is not Safety.NORMAL:
+                return False
+            self.runtime = Runtime.PLAYING
+            if self._target is not None:
+                self.begin_move(self._target)
+            return True
+
+    def stop_program(self, why: str) -> None:
+        """End the program and its motion."""
+        with self._lock:
+            self._program = None
+            self._target = None
+            self.runtime = Runtime.STOPPED
+            self.halt(why)
+
+    def unlock_protective_stop(self) -> bool:
+        """Release a protective stop, which the controller does after five seconds."""
+        if self.now() - self._protective_stop_s < UNLOCK_WAIT_S:
+            return False
+        if self.safety is Safety.PROTECTIVE_STOP:
+            self.safety = Safety.NORMAL
+        return True
+
+    def begin_move(self, target: MoveTarget) -> None:
+        """Start a motion of the program; one that the arm cannot make ends the program."""
+        self._target = target
+        try:
+            self.arm.start_move(target)
+        except (SafetyError, DeviceError) as error:
+            self.note(f"refused by the arm: {error}")
+            self.stop_program("motion impossible")
+
+    def halt(self, why: str) -> None:
+        """Stop the arm."""
+        if self.arm.state().motion is Motion.MOVING:
+            self.note(f"halt: {why}")
+        self.arm.stop()
+
+    def at_rest(self) -> bool:
+        """Whether the arm has come to rest."""
+        if self.arm.state().motion is Motion.MOVING:
+            return False
+        if self.runtime is Runtime.PLAYING:
+            self._target = None
+        return True
+
+    def write_inputs(self, values: dict[str, Value]) -> None:
+        """Take an input package from an RTDE client."""
+        with self._lock:
+            for name, value in values.items():
+                if isinstance(value, int | float):
+                    self.registers[name] = value
+            commanded = any(name.startswith("input_int_register_") for name in values)
+            if commanded and self._program is not None:
+                self._program.kick()
+
+    def read_outputs(self) -> dict[str, Value]:
+        """Return every variable of this cycle, all of the same instant."""
+        with self._lock:
+            state = self.arm.state()
+            return {**self.registers, **self._status(), **self._kinematics(state)}
+
+    def _status(self) -> dict[str, Value]:
+        powered = self.robot_mode is Robot.RUNNING
+        playing = self.runtime is Runtime.PLAYING
+        return {
+            "robot_mode": int(self.robot_mode),
+            "safety_status_bits": int(self.safety),
+            "runtime_state": int(self.runtime),
+            "robot_status_bits": int(powered) | int(playing) << 1,
+            "tcp_offset": self.tcp_offset,
+        }
+
+    def _kinematics(self, state: ArmState) -> dict[str, Value]:
+        joints = state.joints_rad or (0.0,) * 6
+        tcp = pose_of(base_from_tcp(state.base_from_flange, self.tcp_offset))
+        return {
+            "timestamp": state.host_t_s,
+            "actual_q": joints,
+            "actual_qd": state.joint_velocity_rad_s or (0.0,) * 6,
+            "target_q": joints,
+            "actual_TCP_pose": tcp,
+            "target_TCP_pose": tcp,
+        }
+
+    def _run(self) -> None:
+        period_s = 1.0 / self.rate_hz
+        due_s = self.now()
+        while not self._stopping.is_set():
+            self._cycle()
+            due_s = max(due_s + period_s, self.now())
+            time.sleep(max(0.0, due_s - self.now()))
+
+    def _cycle(self) -> None:
+        with self._lock:
+            if self._program is not None and self.runtime is Runtime.PLAYING:
+                self._program.tick()
+            if self._program is not None and self._program.watchdog_expired():
+                self.note("watchdog")
+                self.stop_program("watchdog")
+        if not self.mute:
+            self._rtde.publish(self.read_outputs())

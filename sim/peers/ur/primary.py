@@ -1,0 +1,48 @@
+"""The controller's primary port, 30001: robot state packages, of which one is the kinematics.
+
+Source: Universal Robots, "Remote Control Via TCP/IP", client interfaces: a package is int32 size,
+uint8 type (16 robot state, 20 message); a robot state holds sub-packages of the same shape, of
+which type 5 is the kinematics information.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sim.peers.ur.controller import URController
+
+_PERIOD_S = 0.1
+_MESSAGE, _ROBOT_STATE = 20, 16
+_ROBOT_MODE, _KINEMATICS = 0, 5
+_LINEARISED = 2
+
+
+class PrimaryServer:
+    """Sends robot states of one controller."""
+
+    def __init__(self, controller: URController) -> None:
+        self._controller = controller
+
+    def serve(self, link: socket.socket) -> None:
+        """Send a version message, then a robot state ten times a second."""
+        link.sendall(_package(_MESSAGE, struct.pack(">QBB", 0, 254, 3) + b"\x09URControl"))
+        while True:
+            if not self._controller.mute:
+                link.sendall(_package(_ROBOT_STATE, self._state()))
+            time.sleep(_PERIOD_S)
+
+    def _state(self) -> bytes:
+        mode = _package(_ROBOT_MODE, bytes(41))
+        if self._controller.dh is None:
+            return mode
+        theta, a, d, alpha = self._controller.dh
+        body = struct.pack(">6I24dI", *range(6), *theta, *a, *d, *alpha, _LINEARISED)
+        return mode + _package(_KINEMATICS, body)
+
+
+def _package(kind: int, body: bytes) -> bytes:
+    return struct.pack(">IB", len(body) + 5, kind) + body
