@@ -1,0 +1,254 @@
+"""A simulated arm: the maker's kinematics, trapezoidal moves, scatter, faults on command."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from calib.chain.kinematics import ArmKinematics, OutOfReach
+from calib.views import FloatArray
+from drivers.arm import ArmState, Motion, MoveTarget
+from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable, SafetyError, StopFailed
+from sim.clock import Clock
+from sim.motion import Move, plan_move, standing
+
+ACCELERATION_RAD_S2 = 1.4
+"""Universal Robots' default for `movej`."""
+DECELERATION_RAD_S2 = 4.0
+SETTLE_S = 0.15
+"""The arm calls itself steady this long after the last joint has stopped."""
+
+
+@dataclass
+class ArmFaults:
+    """What tests and demonstrations let go wrong.
+
+    Attributes
+    ----------
+    protective_stop_at_move:
+        The move with this number (from 1) ends in a protective stop halfway.
+    unreachable:
+        The link is dead: every call raises `DeviceUnreachable`.
+    stop_fails:
+        `stop` raises `StopFailed` and the arm goes on.
+    """
+
+    protective_stop_at_move: int | None = None
+    unreachable: bool = False
+    stop_fails: bool = False
+
+
+@dataclass(frozen=True)
+class ArmTruth:
+    """What the world knows of the arm and its controller does not report.
+
+    Attributes
+    ----------
+    joints_rad, joint_velocity_rad_s, approach_joints_rad:
+        (6,) as the controller has them; `approach` is where the last move began.
+    flange_error:
+        (6,) by how much the flange misses the reported pose, in its own frame: metres, radians.
+    """
+
+    joints_rad: FloatArray
+    joint_velocity_rad_s: FloatArray
+    approach_joints_rad: FloatArray
+    flange_error: FloatArray
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Scatter of the true flange around the reported one, one sigma per axis, drawn per move."""
+
+    position_m: float = 0.0
+    rotation_rad: float = 0.0
+
+    def draw(self, rng: np.random.Generator, shape: tuple[int, ...] = ()) -> FloatArray:
+        """(..., 6) flange errors."""
+        sigma = np.repeat([self.position_m, self.rotation_rad], 3)
+        return np.asarray(sigma * rng.standard_normal((*shape, 6)))
+
+
+class SimArm:
+    """An arm in this process; see `drivers.arm.Arm`.
+
+    Parameters
+    ----------
+    kinematics, clock:
+        Which arm, and the time it lives in.
+    home_rad:
+        (6,) joint angles it stands at first.
+    repeatability, seed:
+        How it scatters.
+    """
+
+    tried_on_hardware = False
+
+    def __init__(
+        self,
+        kinematics: ArmKinematics,
+        clock: Clock,
+        home_rad: FloatArray,
+        *,
+        repeatability: Repeatability | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.faults = ArmFaults()
+        self.moves_made = 0
+        self._kinematics = kinematics
+        self._clock = clock
+        self._repeatability = repeatability or Repeatability()
+        self._rng = np.random.default_rng(seed)
+        self._lock = threading.RLock()
+        self._connected = False
+        self._fault: str | None = None
+        self._fault_due_s = np.inf
+        self._flange_error = np.zeros(6)
+        self._move = standing(np.asarray(home_rad, float))
+
+    # -- the protocol ------------------------------------------------------------------------
+
+    def connect(self) -> None:
+        """Open the link; raises `DeviceUnreachable` or, after a fault, `DeviceRefused`."""
+        self._check_link(connected=True)
+        if self._fault is not None:
+            raise DeviceRefused(f"simulated arm: {self._fault}; clear the fault first")
+        self._connected = True
+
+    def state(self) -> ArmState:
+        """The newest reading; raises `DeviceUnreachable` where the link is dead."""
+        with self._lock:
+            self._check_link(self._connected)
+            now = self._advance()
+            joints, speeds = self._move.joints(now), self._move.speeds(now)
+            pose = RigidTransform.from_matrix(self._kinematics.forward(joints))
+            return ArmState(
+                host_t_s=now,
+                controller_t_s=now,
+                joints_rad=tuple(joints.tolist()),
+                joint_velocity_rad_s=tuple(speeds.tolist()),
+                base_from_flange=pose,
+                motion=self._motion(now),
+                fault=self._fault,
+            )
+
+    def start_move(self, target: MoveTarget) -> None:
+        """Begin a move.
+
+        Raises
+        ------
+        SafetyError
+            Out of reach, outside the joint limits, or without a positive speed.
+        ArmStopped, DeviceRefused, DeviceUnreachable
+            A fault is standing; it is still moving; the link is dead.
+        """
+        with self._lock:
+            self._check_link(self._connected)
+            now = self._advance()
+            if self._fault is not None:
+                raise ArmStopped(f"simulated arm: {self._fault}; clear the fault first")
+            if now < self._move.ends_s:
+                raise DeviceRefused("simulated arm: it is still moving; stop it or wait")
+            start = self._move.joints(now)
+            self._move = self._planned(target, start, now)
+            self._flange_error = self._repeatability.draw(self._rng)
+            self.moves_made += 1
+            if self.faults.protective_stop_at_move == self.moves_made:
+                self._fault_due_s = now + 0.5 * self._move.profile.duration_s
+
+    def stop(self) -> None:
+        """Brake; raises `StopFailed` where that was asked for."""
+        with self._lock:
+            if self.faults.stop_fails:
+                raise StopFailed("simulated arm: the controller does not confirm the stop")
+            if self.faults.unreachable:
+                raise StopFailed("simulated arm: the stop could not be sent, the link is dead")
+            self._brake(self._advance())
+
+    def close(self) -> None:
+        """Stop and let go."""
+        with self._lock:
+            self._brake(self._advance())
+            self._connected = False
+
+    # -- the world's side --------------------------------------------------------------------
+
+    def truth(self) -> ArmTruth:
+        """Where the arm is now, for the simulated camera."""
+        with self._lock:
+            now = self._advance()
+            return ArmTruth(
+                self._move.joints(now),
+                self._move.speeds(now),
+                self._move.start_rad,
+                self._flange_error,
+            )
+
+    def protective_stop(self, reason: str = "protective stop") -> None:
+        """Let the controller stop the arm by itself, as a collision would."""
+        with self._lock:
+            self._brake(self._advance())
+            self._fault = reason
+
+    def clear_fault(self) -> None:
+        """What an operator does at the pendant after a protective stop."""
+        with self._lock:
+            self._fault = None
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _planned(self, target: MoveTarget, start: FloatArray, now: float) -> Move:
+        if not (target.tcp_speed_m_s > 0 and target.joint_speed_rad_s > 0):
+            raise SafetyError("simulated arm: a move needs a positive speed")
+        return plan_move(
+            self._kinematics,
+            start,
+            self._goal(target, start),
+            now,
+            flange_speed_m_s=target.tcp_speed_m_s,
+            joint_speed_rad_s=target.joint_speed_rad_s,
+            acceleration_rad_s2=ACCELERATION_RAD_S2,
+        )
+
+    def _goal(self, target: MoveTarget, start: FloatArray) -> FloatArray:
+        if (target.joints_rad is None) == (target.base_from_flange is None):
+            raise ValueError("a move target has either joint angles or a flange pose")
+        if target.base_from_flange is not None:
+            try:
+                return self._kinematics.inverse(target.base_from_flange.as_matrix(), start)
+            except OutOfReach as far:
+                raise SafetyError(f"simulated arm: {far}") from None
+        goal = np.asarray(target.joints_rad, float)
+        if goal.shape != (6,) or not self._kinematics.within_limits(goal):
+            raise SafetyError(
+                f"simulated arm: joint angles {np.round(np.degrees(goal), 1).tolist()} degrees are "
+                f"outside the limits of the {self._kinematics.name}"
+            )
+        return goal
+
+    def _advance(self) -> float:
+        """Now; on the way, a protective stop that has fallen due happens at its own time."""
+        now = self._clock.now()
+        if now >= self._fault_due_s:
+            self._brake(self._fault_due_s)
+            self._fault = "protective stop"
+        return now
+
+    def _brake(self, now: float) -> None:
+        if now < self._move.ends_s:
+            self._move = self._move.braked(now, DECELERATION_RAD_S2)
+            self._fault_due_s = np.inf
+
+    def _motion(self, now: float) -> Motion:
+        if self._fault is not None:
+            return Motion.STOPPED_BY_FAULT
+        return Motion.MOVING if now < self._move.ends_s + SETTLE_S else Motion.STEADY
+
+    def _check_link(self, connected: bool) -> None:
+        if self.faults.unreachable:
+            raise DeviceUnreachable("simulated arm: the link is dead")
+        if not connected:
+            raise DeviceUnreachable("simulated arm: not connected; call connect() first")
