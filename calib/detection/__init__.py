@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.detection.finder import find_chessboard
+from calib.detection.orientation import orient, turned_order, turns_to_agree
 from calib.detection.result import Detection, Rejected
 from calib.views import Board
 
-__all__ = ["Detection", "Rejected", "detect"]
+__all__ = ["Detection", "Rejected", "detect", "orient", "turned_order", "turns_to_agree"]
 
 
 def detect(image: NDArray[Any], board: Board) -> Detection | Rejected:

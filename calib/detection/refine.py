@@ -122,11 +122,8 @@ def _curvature(corners_px: FloatArray, axis: int) -> FloatArray:
 
 
 def _shapes(fitted: FloatArray | None, steps: FloatArray) -> FloatArray:
-    """(rows, cols, 8) what `saddle.fit_corners` takes as given, from an earlier fit if any."""
-    shapes = np.zeros((*steps.shape[:2], 8))
-    det = np.abs(steps[..., 0] * steps[..., 3] - steps[..., 1] * steps[..., 2])
-    shapes[..., 6] = det / np.hypot(steps[..., 0], steps[..., 1])
-    shapes[..., 7] = det / np.hypot(steps[..., 2], steps[..., 3])
+    """(rows, cols, 6) what `saddle.fit_corners` takes as given, from an earlier fit if any."""
+    shapes = np.zeros((*steps.shape[:2], 6))
     if fitted is not None:
         sign = np.sign(fitted[..., CONTRAST])[..., None]
         shapes[..., 0:2] = _smoothed_gradient(fitted[..., MEAN], steps)
@@ -134,6 +131,34 @@ def _shapes(fitted: FloatArray | None, steps: FloatArray) -> FloatArray:
         shapes[..., 4] = _curvature(fitted[..., [X, Y]], axis=1)
         shapes[..., 5] = _curvature(fitted[..., [X, Y]], axis=0)
     return shapes
+
+
+def _extended(values: FloatArray) -> FloatArray:
+    """One more ring of lattice points around, by straight continuation."""
+    for axis in (0, 1):
+        first, last = values.take([0, 1], axis), values.take([-1, -2], axis)
+        before = 2 * first.take([0], axis) - first.take([1], axis)
+        after = 2 * last.take([0], axis) - last.take([1], axis)
+        values = np.concatenate([before, values, after], axis=axis)
+    return values
+
+
+def _neighbour_lines(corners_px: FloatArray) -> FloatArray:
+    """(rows, cols, 4, 4) the `lines` of `saddle.fit_corners`."""
+    rows, cols = corners_px.shape[:2]
+    around = _extended(corners_px)
+    steps = lattice_steps(around)
+    lines = np.ones((rows, cols, 4, 4))
+    # edge 1 has its normal down the rows, edge 2 against the columns
+    for k, (down, right) in enumerate(((1, 0), (-1, 0), (0, -1), (0, 1))):
+        part = (slice(1 + down, 1 + down + rows), slice(1 + right, 1 + right + cols))
+        along = steps[part][..., :2] if k < 2 else steps[part][..., 2:]
+        normal = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        lines[..., k, :2] = normal
+        lines[..., k, 2] = (normal * around[part]).sum(axis=-1)
+    lines[-1, :, 0, 3] = lines[0, :, 1, 3] = lines[:, 0, 2, 3] = lines[:, -1, 3, 3] = 0.0
+    return lines
 
 
 def fit_grid(
@@ -156,7 +181,8 @@ def fit_grid(
         image,
         first.reshape(-1, PARAMETERS),
         steps.reshape(-1, 4),
-        shapes.reshape(-1, 8),
+        shapes.reshape(-1, 6),
+        _neighbour_lines(first[..., [X, Y]]).reshape(-1, 4, 4),
         reach=reach,
         iterations=iterations,
     )

@@ -2,10 +2,11 @@
 
 A pixel near a corner is modelled as
 
-    I = m + C E(d1) E(d2),    d_k = n_k . (p - c) - kappa_k t_k^2 / 2
+    I = m + C (E(d1) E(d2) + R(d1, d2)),    d_k = n_k . (p - c) - kappa_k t_k^2 / 2
 
 with c the corner, n_k the normals of its two edges, kappa_k their (given) curvature and E the
-profile of a blurred edge: erf(d / (sqrt(2) s)) for a Gaussian blur s. Seven parameters are
+profile of a blurred edge: erf(d / (sqrt(2) s)) for a Gaussian blur s. R is what edges that do
+not cross at right angles add. Seven parameters are
 free: c, the two edge angles, s, C, m; the mean and the contrast may carry a given gradient.
 Minimising the squared residual is maximum likelihood for white Gaussian noise, so
 sigma^2 (J^T J)^-1 is the covariance of the corner.
@@ -18,6 +19,7 @@ from typing import Any
 
 import numba
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 PARAMETERS = 7
@@ -28,74 +30,104 @@ PIXEL_VARIANCE = 1.0 / 12.0
 # below this width a pixel's box no longer passes for a Gaussian (residual above 1e-3 of C)
 _BOX_BELOW_PX = 0.75
 _SMALLEST_WIDTH_PX = 0.05
+# edges farther away than this many blur widths change nothing (4e-3 of C)
+_REACH_OF_BLUR = 2.9
 _ROOT_2 = math.sqrt(2.0)
 _ROOT_2PI = math.sqrt(2.0 * math.pi)
+_NODES, _WEIGHTS = (0.5 * (part + shift) for part, shift in zip(leggauss(4), (1, 0), strict=True))
 
 _kernel = numba.njit(cache=True, fastmath=True, error_model="numpy")
 
 
 @_kernel
-def _once_integrated(z: float, s: float) -> float:
-    return float(
-        z * math.erf(z / (_ROOT_2 * s)) + 2 * s / _ROOT_2PI * math.exp(-0.5 * (z / s) ** 2)
+def _erf_and_bell(z: float) -> tuple[float, float]:
+    """erf(z / sqrt(2)) to 1.5e-7 (Abramowitz and Stegun 7.1.26), and exp(-z^2 / 2)."""
+    bell = math.exp(-0.5 * z * z)
+    t = 1.0 / (1.0 + 0.3275911 / _ROOT_2 * abs(z))
+    tail = t * (
+        0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429)))
     )
-
-
-@_kernel
-def _twice_integrated(z: float, s: float) -> float:
-    bell = math.exp(-0.5 * (z / s) ** 2)
-    return float(0.5 * (z * z + s * s) * math.erf(z / (_ROOT_2 * s)) + z * s / _ROOT_2PI * bell)
+    value = 1.0 - tail * bell
+    return (value if z >= 0 else -value), bell
 
 
 @_kernel
 def _gaussian_edge(d: float, s: float) -> tuple[float, float, float]:
     z = d / s
-    if abs(z) > 6.0:
+    if abs(z) > 5.0:
         return (1.0 if d > 0 else -1.0), 0.0, 0.0
-    slope = 2.0 / (_ROOT_2PI * s) * math.exp(-0.5 * z * z)
-    return math.erf(z / _ROOT_2), slope, -z * slope
+    value, bell = _erf_and_bell(z)
+    slope = 2.0 / (_ROOT_2PI * s) * bell
+    return value, slope, -z * slope
 
 
 @_kernel
 def _boxed_edge(d: float, s: float, nx: float, ny: float) -> tuple[float, float, float]:
-    """A Gaussian edge averaged over the pixel's square: two boxes, |nx| and |ny| wide."""
+    """A Gaussian edge averaged over the pixel's square: two boxes, |nx| and |ny| wide.
+
+    Averaging over a box is a difference of antiderivatives; a Gaussian's derivative by its
+    width is s times its second derivative (the heat equation).
+    """
     a, b = max(abs(nx), abs(ny)), min(abs(nx), abs(ny))
-    if abs(d) > 0.5 * (a + b) + 6.0 * s:
+    if abs(d) > 0.5 * (a + b) + 5.0 * s:
         return (1.0 if d > 0 else -1.0), 0.0, 0.0
-    if b < 0.01:
+    if b < 0.03:
         up, down = d + 0.5 * a, d - 0.5 * a
-        value = (_once_integrated(up, s) - _once_integrated(down, s)) / a
-        slope = (math.erf(up / (_ROOT_2 * s)) - math.erf(down / (_ROOT_2 * s))) / a
-        bells = math.exp(-0.5 * (up / s) ** 2) - math.exp(-0.5 * (down / s) ** 2)
-        return value, slope, 2.0 / _ROOT_2PI * bells / a
+        erf_up, bell_up = _erf_and_bell(up / s)
+        erf_down, bell_down = _erf_and_bell(down / s)
+        bells = 2.0 / _ROOT_2PI * (bell_up - bell_down) / a
+        return (up * erf_up - down * erf_down) / a + s * bells, (erf_up - erf_down) / a, bells
     value, slope, widening = 0.0, 0.0, 0.0
     for k in range(4):
         z = d + 0.5 * (a if k < 2 else -a) + 0.5 * (b if k % 2 == 0 else -b)
         sign = 1.0 if k == 0 or k == 3 else -1.0
-        value += sign * _twice_integrated(z, s)
-        slope += sign * _once_integrated(z, s)
-        widening += sign * math.erf(z / (_ROOT_2 * s))
-    # the heat equation: a Gaussian widens by s times its second derivative
+        erf, bell = _erf_and_bell(z / s)
+        value += sign * (0.5 * (z * z + s * s) * erf + z * s / _ROOT_2PI * bell)
+        slope += sign * (z * erf + 2.0 * s / _ROOT_2PI * bell)
+        widening += sign * erf
     return value / (a * b), slope / (a * b), s * widening / (a * b)
 
 
 @_kernel
-def _edge(d: float, s: float, nx: float, ny: float, spacing: float) -> tuple[float, float, float]:
-    """The edge's profile, its slope, and its derivative by the width.
-
-    The neighbouring parallel edges, `spacing` away on both sides, are taken along where the
-    blur reaches them.
-    """
+def _edge(d: float, s: float, nx: float, ny: float) -> tuple[float, float, float]:
+    """The edge's profile, its slope, and its derivative by the width."""
     if s < _BOX_BELOW_PX:
         return _boxed_edge(d, math.sqrt(max(s * s - PIXEL_VARIANCE, _SMALLEST_WIDTH_PX**2)), nx, ny)
-    value, slope, widening = _gaussian_edge(d, s)
-    if spacing < 10.0 * s:
-        for side in (-1.0, 1.0):
-            far, far_slope, far_widening = _gaussian_edge(d + side * spacing, s)
-            value -= far
-            slope -= far_slope
-            widening -= far_widening
-    return value, slope, widening
+    return _gaussian_edge(d, s)
+
+
+@_kernel
+def _slant(z1: float, z2: float, rho: float) -> tuple[float, float, float, float]:
+    """What a blurred crossing of slanted edges has beyond the product of their profiles.
+
+    Blurring sgn(d1) sgn(d2) with a round Gaussian gives a bivariate normal integral whose
+    correlation is rho = n1 . n2; by Plackett's identity it exceeds the product for rho = 0 by
+    4 times the integral of the bivariate density over rho, taken here in arcsin(rho) with four
+    Gauss-Legendre nodes (Drezner and Wesolowsky 1990).
+
+    Returns
+    -------
+    The excess and its derivatives by z1 = d1 / s, z2 = d2 / s and rho.
+    """
+    if abs(rho) < 1e-3 or abs(z1) > 4.0 or abs(z2) > 4.0:
+        return 0.0, 0.0, 0.0, 0.0
+    q = math.sqrt(1.0 - rho * rho)
+    widest = math.asin(rho)
+    excess = 0.0
+    for k in range(4):
+        sine = math.sin(widest * _NODES[k])
+        power = (z1 * z1 + z2 * z2 - 2.0 * z1 * z2 * sine) / (1.0 - sine * sine)
+        excess += _WEIGHTS[k] * math.exp(-0.5 * power)
+    erf1, bell1 = _erf_and_bell(z1)
+    erf2, bell2 = _erf_and_bell(z2)
+    given1, bell_given1 = _erf_and_bell((z2 - rho * z1) / q)
+    given2, _ = _erf_and_bell((z1 - rho * z2) / q)
+    return (
+        2.0 / math.pi * widest * excess,
+        2.0 / _ROOT_2PI * bell1 * (given1 - erf2),
+        2.0 / _ROOT_2PI * bell2 * (given2 - erf1),
+        2.0 / math.pi * bell1 * bell_given1 / q,
+    )
 
 
 @_kernel
@@ -128,86 +160,118 @@ def _solve_damped(A: Any, g: Any, damping: float, step: Any) -> bool:
 
 
 @_kernel
-def _gather(image: Any, p: Any, steps: Any, reach: float, xs: Any, ys: Any, values: Any) -> int:
-    """Collect the window's pixels: all near the edges, every third of the flat squares.
+def _neighbour_edges(x: float, y: float, s: float, lines: Any, first: int) -> tuple[float, bool]:
+    """What the parallel edges on both sides add to an edge's profile at (x, y).
+
+    `lines[first]` lies on the side of positive d, `lines[first + 1]` on the other; each is
+    (nx, ny, offset, known). Beyond a line that is not known to be an edge of squares (the
+    board's margin) anything may lie: False as soon as the blur could reach over it.
+    """
+    added = 0.0
+    for k in range(2):
+        inward = 1.0 if k == 1 else -1.0
+        line = lines[first + k]
+        distance = inward * (line[0] * x + line[1] * y - line[2])
+        if distance > _REACH_OF_BLUR * s:
+            continue
+        if line[3] == 0.0:
+            return added, False
+        added += inward * (1.0 - _gaussian_edge(distance, s)[0])
+    return added, True
+
+
+@_kernel
+def _gather(image: Any, p: Any, steps: Any, lines: Any, reach: float, pixels: Any) -> int:
+    """Collect the window's pixels: all near the edges, some of the flat squares.
 
     The window is the parallelogram of the lattice: |a|, |b| <= reach with p - c = a e1 + b e2.
+    A row of `pixels` is x, y, value, and what neighbouring edges add to the two profiles.
     """
     ax, ay, bx, by = steps
     det = ax * by - ay * bx
     half_w, half_h = reach * (abs(ax) + abs(bx)), reach * (abs(ay) + abs(by))
-    length_a, length_b = math.hypot(ax, ay), math.hypot(bx, by)
-    strip = 3.5 * p[WIDTH] + 1.5
+    per_a, per_b = abs(det) / math.hypot(bx, by), abs(det) / math.hypot(ax, ay)
+    strip = 3.2 * p[WIDTH] + 1.0
     height, width = image.shape
     count = 0
     for iy in range(max(0, int(p[Y] - half_h)), min(height - 1, int(p[Y] + half_h) + 1) + 1):
         for ix in range(max(0, int(p[X] - half_w)), min(width - 1, int(p[X] + half_w) + 1) + 1):
             dx, dy = ix - p[X], iy - p[Y]
             a, b = (dx * by - dy * bx) / det, (ax * dy - ay * dx) / det
-            if abs(a) > reach or abs(b) > reach:
+            if abs(a) > reach or abs(b) > reach or count == pixels.shape[0]:
                 continue
-            near = min(abs(b * det) / length_a, abs(a * det) / length_b)
-            if (near < strip or (ix + iy) % 3 == 0) and count < xs.shape[0]:
-                xs[count], ys[count], values[count] = ix, iy, image[iy, ix]
+            if min(abs(a) * per_a, abs(b) * per_b) > strip and (ix % 3 or iy % 3):
+                continue
+            add1, fine1 = _neighbour_edges(ix, iy, p[WIDTH], lines, 0)
+            add2, fine2 = _neighbour_edges(ix, iy, p[WIDTH], lines, 2)
+            if fine1 and fine2:
+                pixels[count, 0], pixels[count, 1], pixels[count, 2] = ix, iy, image[iy, ix]
+                pixels[count, 3], pixels[count, 4] = add1, add2
                 count += 1
     return count
 
 
 @_kernel
-def _normal_equations(
-    p: Any, xs: Any, ys: Any, values: Any, count: int, shape: Any, A: Any, g: Any
-) -> float:
+def _normal_equations(p: Any, pixels: Any, count: int, shape: Any, A: Any, g: Any) -> float:
     """Fill A = J^T J and g = J^T r; the sum of squared residuals is returned.
 
     `shape` holds the given (not fitted) terms: gradients of mean and contrast (4), curvatures
-    of the two edges (2), distances to the parallel neighbours of the two edges (2).
+    of the two edges (2).
     """
     A[:] = 0.0
     g[:] = 0.0
     J = np.empty(PARAMETERS)
     t1x, t1y = math.cos(p[ANGLE_1]), math.sin(p[ANGLE_1])
     t2x, t2y = math.cos(p[ANGLE_2]), math.sin(p[ANGLE_2])
+    rho, sine = t1x * t2x + t1y * t2y, t1x * t2y - t1y * t2x
+    J[MEAN] = 1.0
     cost = 0.0
     for i in range(count):
-        dx, dy = xs[i] - p[X], ys[i] - p[Y]
+        dx, dy = pixels[i, 0] - p[X], pixels[i, 1] - p[Y]
         along1, along2 = t1x * dx + t1y * dy, t2x * dx + t2y * dy
         d1 = -t1y * dx + t1x * dy - 0.5 * shape[4] * along1 * along1
         d2 = -t2y * dx + t2x * dy - 0.5 * shape[5] * along2 * along2
-        e1, slope1, widening1 = _edge(d1, p[WIDTH], t1y, t1x, shape[6])
-        e2, slope2, widening2 = _edge(d2, p[WIDTH], t2y, t2x, shape[7])
+        e1, slope1, widening1 = _edge(d1, p[WIDTH], t1y, t1x)
+        e2, slope2, widening2 = _edge(d2, p[WIDTH], t2y, t2x)
+        e1, e2 = e1 + pixels[i, 3], e2 + pixels[i, 4]
+        z1, z2 = d1 / p[WIDTH], d2 / p[WIDTH]
+        excess, by_z1, by_z2, by_rho = _slant(z1, z2, rho)
         contrast = p[CONTRAST] + shape[2] * dx + shape[3] * dy
-        residual = values[i] - p[MEAN] - shape[0] * dx - shape[1] * dy - contrast * e1 * e2
-        k1, k2 = contrast * slope1 * e2, contrast * slope2 * e1
-        J[X] = k1 * t1y + k2 * t2y
-        J[Y] = -k1 * t1x - k2 * t2x
-        J[ANGLE_1] = -k1 * along1
-        J[ANGLE_2] = -k2 * along2
-        J[WIDTH] = contrast * (widening1 * e2 + widening2 * e1)
-        J[CONTRAST] = e1 * e2
-        J[MEAN] = 1.0
+        profile = e1 * e2 + excess
+        residual = pixels[i, 2] - p[MEAN] - shape[0] * dx - shape[1] * dy - contrast * profile
         cost += residual * residual
-        for r in range(PARAMETERS):
+        J[CONTRAST] = profile
+        first = CONTRAST
+        if slope1 != 0.0 or slope2 != 0.0:
+            k1 = contrast * (slope1 * e2 + by_z1 / p[WIDTH])
+            k2 = contrast * (slope2 * e1 + by_z2 / p[WIDTH])
+            J[X] = k1 * t1y + k2 * t2y
+            J[Y] = -k1 * t1x - k2 * t2x
+            J[ANGLE_1] = -k1 * along1 + contrast * by_rho * sine
+            J[ANGLE_2] = -k2 * along2 - contrast * by_rho * sine
+            widening = (z1 * by_z1 + z2 * by_z2) / p[WIDTH]
+            J[WIDTH] = contrast * (widening1 * e2 + widening2 * e1 - widening)
+            first = X
+        for r in range(first, PARAMETERS):
             g[r] += J[r] * residual
-            for c in range(r + 1):
+            for c in range(first, r + 1):
                 A[r, c] += J[r] * J[c]
     return cost
 
 
 @_kernel
-def _minimise(
-    p: Any, xs: Any, ys: Any, values: Any, count: int, shape: Any, A: Any, iterations: int
-) -> float:
+def _minimise(p: Any, pixels: Any, count: int, shape: Any, A: Any, iterations: int) -> float:
     """Levenberg-Marquardt from p, in place; the cost, or -1 where it breaks down."""
     g, trial, step = np.empty(PARAMETERS), np.empty(PARAMETERS), np.empty(PARAMETERS)
     A_trial, g_trial = np.empty((PARAMETERS, PARAMETERS)), np.empty(PARAMETERS)
-    cost = _normal_equations(p, xs, ys, values, count, shape, A, g)
+    cost = _normal_equations(p, pixels, count, shape, A, g)
     damping = 1e-3
     for _ in range(iterations):
         if not _solve_damped(A, g, damping, step):
             return -1.0
         trial[:] = p + step
         trial[WIDTH] = min(max(trial[WIDTH], 0.5 * p[WIDTH], 0.29), 2.0 * p[WIDTH])
-        new = _normal_equations(trial, xs, ys, values, count, shape, A_trial, g_trial)
+        new = _normal_equations(trial, pixels, count, shape, A_trial, g_trial)
         moved = abs(step[X]) + abs(step[Y])
         if new <= cost:
             p[:], A[:], g[:] = trial, A_trial, g_trial
@@ -223,22 +287,28 @@ def _minimise(
 
 @numba.njit(cache=True)
 def _fit(
-    image: Any, starts: Any, steps: Any, shapes: Any, reach_px: float, reach: float, iterations: int
+    image: Any,
+    starts: Any,
+    steps: Any,
+    shapes: Any,
+    lines: Any,
+    reach_px: float,
+    reach: float,
+    iterations: int,
 ) -> tuple[Any, Any, Any]:
     M = starts.shape[0]
     fitted = starts.copy()
     covariance = np.full((M, 2, 2), np.nan)
     residual = np.full(M, np.nan)
-    A, step, unit = np.empty((7, 7)), np.empty(7), np.empty(7)
-    capacity = int((4.0 * reach_px + 8.0) ** 2)
-    xs, ys, values = np.empty(capacity), np.empty(capacity), np.empty(capacity)
+    A, step, unit = np.empty((PARAMETERS, PARAMETERS)), np.empty(PARAMETERS), np.empty(PARAMETERS)
+    pixels = np.empty((int((4.0 * reach_px + 8.0) ** 2), 5))
     for i in range(M):
         p = fitted[i]
         longest = max(math.hypot(steps[i, 0], steps[i, 1]), math.hypot(steps[i, 2], steps[i, 3]))
-        count = _gather(image, p, steps[i], min(reach, reach_px / longest), xs, ys, values)
+        count = _gather(image, p, steps[i], lines[i], min(reach, reach_px / longest), pixels)
         if count <= PARAMETERS + 4:
             continue
-        cost = _minimise(p, xs, ys, values, count, shapes[i], A, iterations)
+        cost = _minimise(p, pixels, count, shapes[i], A, iterations)
         if cost < 0.0 or not math.isfinite(cost):
             continue
         variance = cost / (count - PARAMETERS)
@@ -246,10 +316,8 @@ def _fit(
             unit[:] = 0.0
             unit[axis] = 1.0
             if _solve_damped(A, unit, 0.0, step):
-                covariance[i, 0, axis], covariance[i, 1, axis] = (
-                    variance * step[0],
-                    variance * step[1],
-                )
+                covariance[i, 0, axis] = variance * step[X]
+                covariance[i, 1, axis] = variance * step[Y]
                 residual[i] = math.sqrt(variance)
     return fitted, covariance, residual
 
@@ -259,6 +327,7 @@ def fit_corners(
     starts: NDArray[np.float64],
     steps: NDArray[np.float64],
     shapes: NDArray[np.float64],
+    lines: NDArray[np.float64],
     *,
     reach: float = 0.4,
     reach_px: float = 40.0,
@@ -276,8 +345,12 @@ def fit_corners(
     steps:
         (M, 4) lattice steps e1 and e2 at the corner, pixels; edge 1 runs along e1.
     shapes:
-        (M, 8) given terms: gradient of mean (2) and contrast (2) in grey levels per pixel,
-        curvature of the edges (2) in 1/pixel, distance of each edge's parallel neighbours (2).
+        (M, 6) given terms: gradient of mean (2) and contrast (2) in grey levels per pixel,
+        curvature of the edges (2) in 1/pixel.
+    lines:
+        (M, 4, 4) the parallel neighbours of edge 1 (on the side of its normal, then the other)
+        and of edge 2, each as unit normal (2), offset in pixels, and 1 where that is an edge
+        between squares, 0 where it is the rim of the board.
     reach, reach_px:
         The window's half side as a share of the lattice step, and its limit in pixels.
     iterations:
@@ -288,5 +361,7 @@ def fit_corners(
     (M, 7) fitted parameters, (M, 2, 2) covariance of x and y in px^2, (M,) standard deviation
     of the residual in grey levels. Where the fit broke down the latter two are NaN.
     """
-    fitted, covariance, residual = _fit(image, starts, steps, shapes, reach_px, reach, iterations)
+    fitted, covariance, residual = _fit(
+        image, starts, steps, shapes, lines, reach_px, reach, iterations
+    )
     return fitted, covariance, residual
