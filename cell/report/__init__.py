@@ -3,6 +3,15 @@
 from __future__ import annotations
 
 from cell.report.data import Evidence, ReportData, SolutionPoses, Truth
+from cell.report.from_calibration import solution_poses, solution_residuals
 from cell.report.page import write_report
 
-__all__ = ["Evidence", "ReportData", "SolutionPoses", "Truth", "write_report"]
+__all__ = [
+    "Evidence",
+    "ReportData",
+    "SolutionPoses",
+    "Truth",
+    "solution_poses",
+    "solution_residuals",
+    "write_report",
+]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,6 +23,12 @@ PREFERENCE = (
 )
 
 
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names of solutions, the plainest first, unknown ones last."""
+    rank = {name: -place for place, name in enumerate(PREFERENCE)}
+    return sorted(names, key=lambda name: rank.get(name, 1))
+
+
 @dataclass(frozen=True)
 class SolutionPoses:
     """Where one solution, and where the robot, put the camera in each of N views.
@@ -34,10 +40,13 @@ class SolutionPoses:
     board_from_camera_by_robot:
         (N, 4, 4) from the logged flange poses and the solved hand-eye and board poses, metres;
         None where no flange pose was logged.
+    scale_px:
+        (N, 2) alpha and beta the solution gives each view, pixels, where they move with focus.
     """
 
     board_from_camera: FloatArray
     board_from_camera_by_robot: FloatArray | None = None
+    scale_px: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -140,8 +149,14 @@ class ReportData:
 
     @property
     def solutions(self) -> Mapping[str, Mapping[str, Any]]:
-        """The solutions of calibration.json by name; empty without a calibration."""
-        return (self.calibration or {}).get("solutions") or {}
+        """The solutions of calibration.json by name, plainest first; empty without any."""
+        found = (self.calibration or {}).get("solutions") or {}
+        return {name: found[name] for name in in_order(found)}
+
+    def why_missing(self, name: str) -> str:
+        """The reason calibration.json gives for what it could not know."""
+        missing = (self.calibration or {}).get("missing") or {}
+        return str(missing.get(name) or "no reason is given")
 
     @property
     def recommended(self) -> str | None:

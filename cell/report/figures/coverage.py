@@ -51,6 +51,7 @@ def _image(ax: Axes, data: ReportData) -> None:
     shown = ax.imshow(counts, extent=(0, views.width_px, views.height_px, 0), cmap="cividis_r",
                       vmin=0, aspect="equal")  # fmt: skip
     ax.set(title="corners over the image", xlabel="u (px)", ylabel="v (px)")
+    ax.grid(visible=False)
     ax.figure.colorbar(shown, ax=ax, shrink=0.8, pad=0.02).set_label("corners")
 
 

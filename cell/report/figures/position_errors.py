@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib.views import FloatArray
-from cell.report.data import ReportData
+from cell.report.data import ReportData, in_order
 from cell.report.figures.canvas import legend_below, panels, style
 from cell.report.geometry import position_error_m, reference
 from cell.report.numbers import solution_name
@@ -21,7 +21,8 @@ _ZOOM = 5.0
 def errors_mm(data: ReportData) -> dict[str, FloatArray]:
     """Per solution (N, 3) camera position error in the true camera's axes, millimetres."""
     out = {}
-    for name, poses in data.poses.items():
+    for name in in_order(data.poses):
+        poses = data.poses[name]
         true, _ = reference(data, poses)
         if true is not None:
             out[name] = position_error_m(poses.board_from_camera, true) * 1e3

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.views import FloatArray
 from cell.report.data import ReportData
-from cell.report.figures.canvas import BLACK, BLUE, GREY, legend_below, panels, style
+from cell.report.figures.canvas import BLACK, GREEN, GREY, legend_below, panels, style
 from cell.report.geometry import best_poses, distance_m
 from cell.report.numbers import solution_name
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def draw(data: ReportData) -> Figure | None:
     """α and β of each parallel view against distance, or None where none was measured."""
     factors = (data.calibration or {}).get("scale_factors") or []
-    if not factors:
+    if not factors and not any(p.scale_px is not None for p in data.poses.values()):
         return None
     figure, axes = panels(9.2, 3.9, columns=2, sharex=True)
     for ax, letter in zip(axes, ("alpha", "beta"), strict=True):
@@ -50,12 +50,14 @@ def _panel(ax: Axes, data: ReportData, factors: list[Mapping[str, float]], lette
     value = _column(factors, f"{letter}_px")
     sigma = _column(factors, f"{letter}_sigma_px")
     greek = {"alpha": "α", "beta": "β"}[letter]
-    ax.errorbar(
-        distance, value, np.nan_to_num(sigma), fmt="x", color=BLACK, ecolor=GREY, capsize=2,
-        label="measured, ± 1σ", zorder=4,
-    )  # fmt: skip
-    _zones(ax, data, letter, distance)
-    _law(ax, data, letter, distance)
+    if factors:
+        ax.errorbar(
+            distance, value, np.nan_to_num(sigma), fmt="x", color=BLACK, ecolor=GREY, capsize=2,
+            label="measured, ± 1σ", zorder=4,
+        )  # fmt: skip
+        _zones(ax, data, letter, distance)
+        _law(ax, data, letter, distance)
+    _moving(ax, data, letter)
     _constants(ax, data, letter)
     _truth(ax, data, letter)
     low, high = ax.get_ylim()
@@ -92,13 +94,25 @@ def _law(ax: Axes, data: ReportData, letter: str, distance: FloatArray) -> None:
     if law and curve is not None:
         ratio = _beta_over_alpha(data) if letter == "beta" else 1.0
         words = str(law["law"]).replace("_", " ")
-        ax.plot(grid, curve * ratio, color=BLUE, linestyle="-.", label=f"fitted law: {words}")
+        ax.plot(grid, curve * ratio, color=GREEN, linestyle="-.", label=f"fitted law: {words}")
 
 
 def _beta_over_alpha(data: ReportData) -> float:
     best = data.solutions.get(data.recommended or "", {})
     alpha, beta = best.get("alpha_px"), best.get("beta_px")
     return float(beta / alpha) if alpha and beta else 1.0
+
+
+def _moving(ax: Axes, data: ReportData, letter: str) -> None:
+    """The scale factor the best solution gives each view, where it moves with focus."""
+    poses, name = best_poses(data), data.best_of(data.poses)
+    if poses is None or poses.scale_px is None or name is None:
+        return
+    distance = distance_m(poses.board_from_camera, data.views.board)
+    order = np.argsort(distance)
+    scale = poses.scale_px[:, ("alpha", "beta").index(letter)]
+    ax.plot(distance[order], scale[order], color=style(name)["color"], linewidth=1,
+            label=solution_name(name), zorder=3)  # fmt: skip
 
 
 def _constants(ax: Axes, data: ReportData, letter: str) -> None:

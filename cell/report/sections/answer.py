@@ -64,7 +64,7 @@ def usable_m(data: ReportData) -> tuple[float, float] | None:
     low, high = min(seen), max(seen)
     zones: dict[str, Any] = calibration.get("zones") or {}
     law = (calibration.get("focus_law") or {}).get("law")
-    if law in (None, "constant"):
+    if law == "constant":
         low = max(low, zones.get("near_limit_m") or low)
         high = min(high, zones.get("far_limit_m") or high)
     return low, high
@@ -144,8 +144,10 @@ def _range(usable: tuple[float, float] | None) -> str:
 
 def _zone_note(data: ReportData) -> str:
     law = ((data.calibration or {}).get("focus_law") or {}).get("law")
-    if law in (None, "constant"):
+    if law == "constant":
         return "where one scale factor holds, and frames were taken"
+    if law is None:
+        return "frames were taken here"
     return f"frames were taken here; the scale factor follows distance ({law.replace('_', ' ')})"
 
 

@@ -44,7 +44,7 @@ def _reasons(rejected: dict[int, str]) -> str:
     if not rejected:
         return ""
     table = html.table(("rejected frame", "reason"), sorted(rejected.items()))
-    return html.fold(f"{len(rejected)} rejected frames and why", table)
+    return html.fold(f"Rejected frames and why ({len(rejected)})", table)
 
 
 def _frame(data: ReportData, frame: int, reason: str | None) -> str:

@@ -26,17 +26,15 @@ def lens(data: ReportData) -> str:
         "lens",
         "Lens: scale factors against distance",
         shown,
-        html.paragraph(_zones(calibration)),
-        _law(calibration.get("focus_law")),
+        html.paragraph(_zones(data, calibration.get("zones"))),
+        _law(data, calibration.get("focus_law")),
         _factors(calibration.get("scale_factors") or []),
     )
 
 
-def _zones(calibration: Mapping[str, Any]) -> str:
-    zones = calibration.get("zones")
-    if not isinstance(zones, Mapping) or "near_limit_m" not in zones:
-        given = zones.get("reason") if isinstance(zones, Mapping) else zones
-        reason = given or calibration.get("zones_reason") or "no reason is given"
+def _zones(data: ReportData, zones: Mapping[str, Any] | None) -> str:
+    if not zones or "near_limit_m" not in zones:
+        reason = (zones or {}).get("reason") or data.why_missing("zones")
         return f"Zones were not found: {reason}."
     return (
         f"One scale factor holds (zone 2) from {number(zones.get('near_limit_m'), 'm')} to "
@@ -46,9 +44,10 @@ def _zones(calibration: Mapping[str, Any]) -> str:
     )
 
 
-def _law(law: Mapping[str, Any] | None) -> str:
-    if not law:
-        return html.missing("No focus law was fitted.")
+def _law(data: ReportData, law: Mapping[str, Any] | None) -> str:
+    if not law or "law" not in law:
+        reason = (law or {}).get("reason") or data.why_missing("focus_law")
+        return html.missing(f"No focus law was fitted to scale factors: {reason}.")
     rows = [
         (symbol(name), measured(entry["value"], entry.get("sigma"), entry.get("unit", "")))
         for name, entry in (law.get("parameters") or {}).items()

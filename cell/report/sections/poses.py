@@ -34,11 +34,11 @@ def poses(data: ReportData) -> str:
 
 
 def _solved(data: ReportData) -> str:
-    calibration = data.calibration or {}
+    calibration, why = data.calibration or {}, data.why_missing("robot")
     names = ("flange_from_camera", "base_from_board", "flange_from_board", "base_from_camera")
     rows = [_pose_row(name, calibration[name]) for name in names if calibration.get(name)]
     if not rows:
-        return html.missing("The camera's place on the flange was not solved: " + _NO_ROBOT)
+        return html.missing(f"The camera's place on the flange was not solved: {why}.")
     head = ("pose", "x", "y", "z", "quaternion x, y, z, w", "± turn")
     return html.table(head, rows, "Solved together with the camera, one-sigma uncertainties")
 

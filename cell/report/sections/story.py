@@ -27,7 +27,7 @@ from cell.report.sections.drawing import drawing
 def story(data: ReportData) -> str:
     """The whole diagnosis, or that there was none."""
     if data.diagnosis is None:
-        words = "No diagnosis was made: run `cell diagnose` on this recording."
+        words = "No diagnosis was made: “cell diagnose” makes one from this recording."
         return html.section("diagnosis", "Diagnosis", html.missing(words))
     verdict, meaning, _ = verdict_words(data)
     return html.section(

@@ -44,7 +44,9 @@ def _scale(data: ReportData) -> Iterator[str]:
     sigma = best.get("sigma") or {}
     if known(best.get("alpha_px")):
         alpha = measured(best["alpha_px"], sigma.get("alpha_px"), "px")
-        yield f"α is {alpha} in the {solution_name(str(data.recommended))}."
+        at = best.get("at_distance_m")
+        where = f" at {number(at, 'm')}; it moves with distance" if at else ""
+        yield f"α is {alpha}{where} ({solution_name(str(data.recommended))})."
     if known(best.get("u0_px")):
         u0 = measured(best["u0_px"], sigma.get("u0_px"), "px")
         v0 = measured(best.get("v0_px"), sigma.get("v0_px"), "px")
