@@ -12,12 +12,15 @@ from calib.chain.kinematics import ArmKinematics, OutOfReach
 from calib.views import FloatArray
 from drivers.arm import ArmState, Motion, MoveTarget
 from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable, SafetyError, StopFailed
+from drivers.targets import check_target
 from sim.clock import Clock
 from sim.motion import Move, plan_move, standing
 
 ACCELERATION_RAD_S2 = 1.4
 """Universal Robots' default for `movej`."""
 DECELERATION_RAD_S2 = 4.0
+MAX_JOINT_SPEED_RAD_S, MAX_TCP_SPEED_M_S = 10.0, 10.0
+"""No arm of this class is as fast: a target that asks for more is a mistake of units."""
 SETTLE_S = 0.15
 """The arm calls itself steady this long after the last joint has stopped."""
 
@@ -201,8 +204,12 @@ class SimArm:
     # -- inside ------------------------------------------------------------------------------
 
     def _planned(self, target: MoveTarget, start: FloatArray, now: float) -> Move:
-        if not (target.tcp_speed_m_s > 0 and target.joint_speed_rad_s > 0):
-            raise SafetyError("simulated arm: a move needs a positive speed")
+        check_target(
+            target,
+            max_joint_speed_rad_s=MAX_JOINT_SPEED_RAD_S,
+            max_tcp_speed_m_s=MAX_TCP_SPEED_M_S,
+            joint_limits_rad=[(low, high) for low, high in self._kinematics.limits_rad],
+        )
         return plan_move(
             self._kinematics,
             start,
@@ -214,20 +221,12 @@ class SimArm:
         )
 
     def _goal(self, target: MoveTarget, start: FloatArray) -> FloatArray:
-        if (target.joints_rad is None) == (target.base_from_flange is None):
-            raise ValueError("a move target has either joint angles or a flange pose")
         if target.base_from_flange is not None:
             try:
                 return self._kinematics.inverse(target.base_from_flange.as_matrix(), start)
             except OutOfReach as far:
                 raise SafetyError(f"simulated arm: {far}") from None
-        goal = np.asarray(target.joints_rad, float)
-        if goal.shape != (6,) or not self._kinematics.within_limits(goal):
-            raise SafetyError(
-                f"simulated arm: joint angles {np.round(np.degrees(goal), 1).tolist()} degrees are "
-                f"outside the limits of the {self._kinematics.name}"
-            )
-        return goal
+        return np.asarray(target.joints_rad, float)
 
     def _advance(self) -> float:
         """Now; on the way, a protective stop that has fallen due happens at its own time."""

@@ -11,7 +11,6 @@ from drivers.errors import (
     DeviceError,
     DeviceRefused,
     DeviceUnreachable,
-    SafetyError,
     StopFailed,
 )
 from drivers.targets import check_target
@@ -111,7 +110,7 @@ class URArm:
         if supervisor.fault is not None:
             raise ArmStopped(self._named(supervisor.fault))
         if supervisor.busy or not at_rest(packet):
-            raise SafetyError(
+            raise DeviceRefused(
                 self._named("still moving: wait until it is steady, or stop it first")
             )
         supervisor.order(self._order(target, packet))

@@ -116,7 +116,7 @@ def test_what_it_will_not_do_is_a_safety_error_and_nothing_moves(target):
 
 def test_a_target_is_joints_or_pose():
     robot, _ = ready()
-    with pytest.raises(ValueError, match="either"):
+    with pytest.raises(SafetyError, match="either"):
         robot.start_move(MoveTarget())
 
 

@@ -9,26 +9,44 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
-from stand_in import HOME, StandInArm
+import numpy as np
+from scipy.spatial.transform import RigidTransform
 
+from calib.chain.kinematics import arm as kinematics_of
 from drivers.arm import Arm, ArmState, Motion, MoveTarget
 from drivers.ur import URArm, URSettings
+from sim.arm import SimArm
+from sim.clock import WallClock
 from sim.peers.ur import URController
 
+UR_HOME = (0.1, -1.4, 1.6, -1.7, -1.5, 0.2)
 _numbers = itertools.count(2)
 
 
 @dataclass
 class Bench:
+    """`watched`: there is a controller that looks after its own link."""
+
     arm: Arm
-    truth: Callable[[], ArmState]
+    sim: SimArm
+    model: str
     home: tuple[float, ...]
     trip: Callable[[], None]
     lose: Callable[[], None]
     stop_times_s: Callable[[], list[float]]
+    watched: bool = True
 
     def nearby(self, shift_rad: float = 0.15) -> tuple[float, ...]:
         return tuple(angle + shift_rad for angle in self.home)
+
+    def true_joints(self) -> np.ndarray:
+        return self.sim.truth().joints_rad
+
+    def true_pose(self) -> RigidTransform:
+        return RigidTransform.from_matrix(kinematics_of(self.model).forward(self.true_joints()))
+
+    def truly_moving(self) -> bool:
+        return bool(np.abs(self.sim.truth().joint_velocity_rad_s).max() > 0.0)
 
 
 def own_address() -> str:
@@ -37,16 +55,35 @@ def own_address() -> str:
     return f"127.{process // 250 + 10}.{process % 250}.{next(_numbers)}"
 
 
-def dh_of(sim: StandInArm) -> tuple[tuple[float, ...], ...]:
-    theta, d, a, alpha = sim.kinematics.dh.T
-    return tuple(theta), tuple(a), tuple(d), tuple(alpha)
+def simulated(model: str, home: tuple[float, ...]) -> SimArm:
+    return SimArm(kinematics_of(model), WallClock(), np.array(home))
 
 
 @contextmanager
-def ur_peer() -> Iterator[tuple[URController, StandInArm]]:
-    sim = StandInArm()
-    with URController(sim, own_address(), dh=dh_of(sim)) as controller:
+def ur_peer() -> Iterator[tuple[URController, SimArm]]:
+    sim = simulated("ur5e", UR_HOME)
+    theta, d, a, alpha = (tuple(column) for column in kinematics_of("ur5e").dh.T)
+    with URController(sim, own_address(), dh=(theta, a, d, alpha)) as controller:
         yield controller, sim
+
+
+@contextmanager
+def sim_bench() -> Iterator[Bench]:
+    sim = simulated("ur5e", UR_HOME)
+    stopped_s: list[float] = []
+    stop = sim.stop
+
+    def noted_stop() -> None:
+        stop()
+        stopped_s.append(time.monotonic())
+
+    def lose() -> None:
+        sim.faults.unreachable = True
+
+    sim.stop = noted_stop  # type: ignore[method-assign]
+    yield Bench(
+        sim, sim, "ur5e", UR_HOME, sim.protective_stop, lose, lambda: stopped_s, watched=False
+    )
 
 
 @contextmanager
@@ -58,8 +95,9 @@ def ur_bench() -> Iterator[Bench]:
         stack.callback(arm.close)
         yield Bench(
             arm,
-            sim.state,
-            HOME,
+            sim,
+            "ur5e",
+            UR_HOME,
             controller.protective_stop,
             controller.kill,
             lambda: [event.t_s for event in controller.events if event.what.startswith("halt")],
