@@ -116,6 +116,8 @@ class Retry(Part):
 
     attempts: PositiveInt = 3
     then: Literal["skip", "stop"] = "skip"
+    give_up_after: PositiveInt = 5
+    """So many views skipped before the first good frame end the run."""
 
 
 class PlanFile(Part):
@@ -169,6 +171,10 @@ class Plan:
     def view_name(self, index: int) -> str:
         """A view's name, or its number."""
         return self.file.views[index].name or f"view {index}"
+
+    def where(self, index: int) -> str:
+        """Where a view stands, for messages."""
+        return f"{self.path}: views.{index} ({self.view_name(index)})"
 
 
 def read_plan(path: Path) -> Plan:

@@ -1,4 +1,4 @@
-"""The published JSON schemas of plan and cell files, for editors and other programs.
+"""The published JSON schemas of the files, for editors and other programs.
 
 ``python -m cell.files.schemas`` writes them anew; a test keeps them in step with the models.
 """
@@ -10,11 +10,16 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
+from cell.files.calibration_file import CalibrationFile
 from cell.files.cell_file import CellFile
 from cell.files.plan_file import PlanFile
 
 FOLDER = Path(__file__).parents[1] / "schemas"
-MODELS: dict[str, type[BaseModel]] = {"cell.schema.json": CellFile, "plan.schema.json": PlanFile}
+MODELS: dict[str, type[BaseModel]] = {
+    "calibration.schema.json": CalibrationFile,
+    "cell.schema.json": CellFile,
+    "plan.schema.json": PlanFile,
+}
 
 
 def schema_text(model: type[BaseModel]) -> str:

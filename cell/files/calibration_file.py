@@ -1,0 +1,192 @@
+"""`calibration.json` as a model: all that is written is checked against it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+
+Vector = tuple[float, float, float]
+Sigma = Annotated[float, Field(ge=0)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False
+    )
+
+
+class RejectedFrame(_Part):
+    """A frame left out."""
+
+    frame: int
+    reason: str
+
+
+class ScaleFactorPart(_Part):
+    """Scale factors of one view nearly parallel to the board (the paper's Eqs. 14, 15)."""
+
+    frame: int
+    distance_m: PositiveFloat
+    """Depth of the board's centre along the optical axis, from the robot."""
+    alpha_px: PositiveFloat
+    alpha_sigma_px: Sigma
+    """One sigma, without the error common to all distances."""
+    beta_px: PositiveFloat
+    beta_sigma_px: Sigma
+    tilt_rad: float
+
+
+class ZonesPart(_Part):
+    """Where the focal length stands still (zone 2)."""
+
+    near_limit_m: PositiveFloat
+    near_sigma_m: float | None
+    """Null where the limit is no change point."""
+    far_limit_m: PositiveFloat
+    near_is_bound: bool
+    """True where the zone reaches at least to the nearest view."""
+    far_is_bound: bool
+    alpha_px: PositiveFloat
+    alpha_sigma_px: Sigma
+    beta_px: PositiveFloat
+    beta_sigma_px: Sigma
+    method: Literal["change_point", "tolerance", "constant"]
+    why: str
+
+
+class ParameterPart(_Part):
+    """A fitted number."""
+
+    value: float
+    sigma: Sigma
+    unit: str
+
+
+class CandidateLaw(_Part):
+    """A law that was fitted; of AICc and BIC only differences mean something."""
+
+    law: str
+    aicc: float | None
+    bic: float
+    scatter: Sigma
+    """Standard deviation of the weighted residuals; 1 where the sigmas tell all."""
+    parameters: dict[str, ParameterPart]
+
+
+class FocusLawPart(_Part):
+    """How alpha moves with distance."""
+
+    law: str
+    parameters: dict[str, ParameterPart]
+    beta_parameters: dict[str, ParameterPart]
+    """The same law fitted to beta; the names are alpha's."""
+    why: str
+    decisive: bool
+    candidates: tuple[CandidateLaw, ...]
+
+
+class Reprojection(_Part):
+    """Residuals, detected minus predicted: signed statistics of the components, rms per corner."""
+
+    mean: float
+    median: float
+    std: Sigma
+    rms: Sigma
+
+
+class PositionStatistics(_Part):
+    """Computed camera in the true camera's frame, metres; z forward, positive is too close."""
+
+    mean: Vector
+    std: Vector
+    rms: Sigma
+
+
+class PositionErrorPart(PositionStatistics):
+    """Against the robot through the transforms of the joint fit."""
+
+    own_hand_eye: PositionStatistics | None
+    """Against transforms solved from this solution alone: a constant error disappears in them."""
+    robot_in_it: bool
+    """True where the solution was made with the robot's distances: its z against that same robot
+    is small by construction."""
+
+
+class Consistency(_Part):
+    """How far this solution's poses and the robot's disagree after hand-eye on them."""
+
+    rms_m: Sigma
+    rms_rad: Sigma
+
+
+class SolutionPart(_Part):
+    """One camera model."""
+
+    alpha_px: PositiveFloat
+    beta_px: PositiveFloat
+    u0_px: float
+    v0_px: float
+    skew_px: float
+    k1: float
+    k2: float
+    at_distance_m: float | None
+    """Where alpha and beta move with distance: the distance they are told at."""
+    sigma: dict[str, Sigma]
+    reprojection_px: Reprojection
+    camera_position_error_m: PositionErrorPart | None
+    robot_consistency: Consistency | None
+
+
+class TransformPart(_Part):
+    """A rigid transform; the sigmas are of increments in the second-named frame."""
+
+    p_m: Vector
+    q_xyzw: tuple[float, float, float, float]
+    sigma_p_m: Vector
+    sigma_r_rad: Vector
+
+
+class RobotPart(_Part):
+    """What the joint fit said of robot and noise."""
+
+    mount: Literal["eye_in_hand", "eye_to_hand"]
+    source: Literal["joint", "hand_eye"]
+    focus_law: str | None
+    focus_law_gain_aic: float
+    flange_sigma_m: Sigma
+    flange_sigma_rad: Sigma
+    corner_sigma_px: Sigma
+    outliers: tuple[int, ...]
+    """Frames whose logged pose disagrees with their picture."""
+
+
+class CalibrationFile(_Part):
+    """The whole of `calibration.json`; metres, radians, pixels."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        use_attribute_docstrings=True,
+        allow_inf_nan=False,
+        populate_by_name=True,
+    )
+
+    schema_: Literal["cell.calibration/1"] = Field(alias="schema")
+    recording: str
+    frames_used: tuple[int, ...]
+    frames_rejected: tuple[RejectedFrame, ...]
+    scale_factors: tuple[ScaleFactorPart, ...]
+    zones: ZonesPart | None
+    zones_reason: str | None
+    focus_law: FocusLawPart | None
+    solutions: dict[str, SolutionPart]
+    flange_from_camera: TransformPart | None
+    base_from_board: TransformPart | None
+    flange_from_board: TransformPart | None
+    """With a fixed camera: the board on the flange."""
+    base_from_camera: TransformPart | None
+    """With a fixed camera: the camera in the base."""
+    robot: RobotPart | None
+    missing: dict[str, str]
+    """What could not be known, and why."""

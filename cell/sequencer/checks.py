@@ -1,0 +1,55 @@
+"""Whether a frame is good enough to keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.detection import Detection, detect
+from calib.views import Board
+from cell.files.plan_file import Checks
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the check of one frame said.
+
+    Attributes
+    ----------
+    fault:
+        None, or why the frame should be taken again.
+    detection:
+        The board, where one was looked for and found.
+    """
+
+    fault: str | None
+    detection: Detection | None = None
+
+
+def check_frame(image: NDArray[np.generic], board: Board, checks: Checks) -> Verdict:
+    """Judge a picture: board found, enough corners, sharp, not saturated."""
+    if not checks.board:
+        return Verdict(None)
+    found = detect(image, board)
+    if not isinstance(found, Detection):
+        return Verdict(f"board not found: {found.reason}")
+    return Verdict(_fault(found, checks), found)
+
+
+def _fault(found: Detection, checks: Checks) -> str | None:
+    corners = int(np.isfinite(found.corners_px).all(axis=1).sum())
+    if corners < checks.min_corners:
+        return f"only {corners} corners in sight, need {checks.min_corners}"
+    if checks.max_blur_px is not None and found.frame_blur_px > checks.max_blur_px:
+        return (
+            f"blurred: edges are {found.frame_blur_px:.1f} px wide, allowed are"
+            f" {checks.max_blur_px:.1f}. Focus, or close the aperture."
+        )
+    if found.saturated > checks.max_saturated:
+        return (
+            f"saturated: {found.saturated:.0%} of the board's white is at full scale, allowed are"
+            f" {checks.max_saturated:.0%}. Shorten the exposure."
+        )
+    return None

@@ -1,0 +1,193 @@
+"""What is checked before the arm may move: reach, joint limits, boxes along the path, speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from calib.chain.kinematics import MODELS, ArmKinematics, OutOfReach, UnknownArm, arm
+from calib.views import FloatArray
+from cell.errors import InputError
+from cell.files.cell_file import CellFile
+from cell.files.parts import Box
+from cell.files.plan_file import Plan
+from drivers.arm import MoveTarget
+from drivers.errors import SafetyError
+
+_STEP_RAD = np.radians(3.0)
+_MOVING_FRAMES = slice(2, None)
+"""Base and shoulder stand where the robot was bolted down; everything after them sweeps."""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Refuses what the arm must not do; every move of a run passes through it.
+
+    Attributes
+    ----------
+    cell:
+        Arm, layout, workspace and keep-out boxes.
+    speed_m_s, joint_speed_rad_s:
+        Greatest speed of flange and camera, and of any joint.
+    """
+
+    cell: CellFile
+    speed_m_s: float
+    joint_speed_rad_s: float
+
+    @classmethod
+    def of(cls, plan: Plan) -> Guard:
+        """The guard of a plan."""
+        joint_speed = float(np.radians(plan.file.joint_speed_deg_s))
+        return cls(plan.cell, plan.file.speed_m_s, joint_speed)
+
+    @cached_property
+    def kinematics(self) -> ArmKinematics:
+        """The arm's kinematics; raises `InputError` for a model nobody knows."""
+        try:
+            return arm(self.cell.robot.model)
+        except UnknownArm:
+            raise InputError(
+                f"robot.model: {self.cell.robot.model} is not known; known are {', '.join(MODELS)}"
+            ) from None
+
+    @cached_property
+    def _flange_from_tool(self) -> FloatArray:
+        """(4, 4) flange_from_camera or flange_from_board: the point that reaches out farthest."""
+        layout = self.cell.layout
+        return np.eye(4) if layout is None else layout.mounted.transform().as_matrix()
+
+    def joints_of(self, plan: Plan, index: int, near_rad: FloatArray) -> FloatArray:
+        """(6,) joint angles of a plan's view, by the branch nearest to `near_rad`.
+
+        Raises
+        ------
+        InputError
+            The arm cannot reach the view.
+        SafetyError
+            Its joint angles are outside the arm's limits.
+        """
+        view = plan.file.views[index]
+        where = plan.where(index)
+        joints = view.joints()
+        if joints is None and view.base_from_flange is not None:
+            pose = view.base_from_flange.transform().as_matrix()
+            try:
+                return self.kinematics.inverse(pose, near_rad)
+            except OutOfReach as far:
+                raise InputError(f"{where}: is unreachable: {far}") from None
+        target = np.asarray(joints, dtype=float)
+        if target.shape != (6,):
+            raise InputError(f"{where}: has {target.size} joint angles, the arm has 6")
+        self._check_limits(target, where)
+        return target
+
+    def _check_limits(self, joints_rad: FloatArray, where: str) -> None:
+        low, high = self.kinematics.limits_rad.T
+        out = np.flatnonzero((joints_rad < low) | (joints_rad > high))
+        if out.size:
+            told = ", ".join(
+                f"joint {i + 1} at {np.degrees(joints_rad[i]):.1f}° is outside"
+                f" {np.degrees(low[i]):.0f}..{np.degrees(high[i]):.0f}°"
+                for i in out
+            )
+            raise SafetyError(f"{where}: {told}")
+
+    def path(self, start_rad: FloatArray, end_rad: FloatArray) -> FloatArray:
+        """(S, 6) joint angles along the straight joint move, no farther than 3° apart."""
+        span = float(np.abs(end_rad - start_rad).max(initial=0.0))
+        share = np.linspace(0.0, 1.0, 2 + int(span / _STEP_RAD))[:, None]
+        return np.asarray(start_rad + share * (end_rad - start_rad))
+
+    def check_move(self, start_rad: FloatArray, end_rad: FloatArray, where: str) -> None:
+        """Raise `SafetyError` where the move leaves the workspace or enters a keep-out box."""
+        path = self.path(start_rad, end_rad)
+        self._check_limits(path[-1], where)
+        points = self._points_m(path)
+        space = self.cell.workspace
+        if space is not None and not _inside(points, space).all():
+            x, y, z = points[~_inside(points, space)][0]
+            raise SafetyError(
+                f"{where}: the arm would leave the workspace at x={x:.3f} y={y:.3f} z={z:.3f} m."
+                " Change the view, go there over another one, or correct `workspace`."
+            )
+        for box in self.cell.keep_out:
+            entered = _inside(points, box)
+            if entered.any():
+                x, y, z = points[entered][0]
+                raise SafetyError(
+                    f"{where}: the arm would enter the keep-out box `{box.name}` at"
+                    f" x={x:.3f} y={y:.3f} z={z:.3f} m. Change the view, or go over another one."
+                )
+
+    def _points_m(self, path_rad: FloatArray) -> FloatArray:
+        """(S, P, 3) points of the arm that sweep: elbow to flange, and what it carries."""
+        frames = self.kinematics.frames(path_rad)[..., _MOVING_FRAMES, :, :]
+        tool = frames[..., -1:, :, :] @ self._flange_from_tool
+        return np.asarray(np.concatenate([frames, tool], axis=-3)[..., :3, 3])
+
+    def move_time_s(self, start_rad: FloatArray, end_rad: FloatArray) -> float:
+        """Least time of a move at the plan's speeds, without acceleration."""
+        span = float(np.abs(end_rad - start_rad).max(initial=0.0))
+        return span / self._joint_speed_rad_s(start_rad, end_rad) if span else 0.0
+
+    def target(self, start_rad: FloatArray, end_rad: FloatArray, where: str) -> MoveTarget:
+        """The move, checked, at a joint speed that keeps flange and camera within the limit.
+
+        Raises
+        ------
+        SafetyError
+            See `check_move`.
+        """
+        self.check_move(start_rad, end_rad, where)
+        return MoveTarget(
+            joints_rad=tuple(end_rad.tolist()),
+            tcp_speed_m_s=self.speed_m_s,
+            joint_speed_rad_s=self._joint_speed_rad_s(start_rad, end_rad),
+        )
+
+    def _joint_speed_rad_s(self, start_rad: FloatArray, end_rad: FloatArray) -> float:
+        """Speed of the fastest joint at which no outer point exceeds the limit on the path."""
+        path = self.path(start_rad, end_rad)
+        steps = np.diff(self._points_m(path)[:, -2:], axis=0)
+        length_m = float(np.linalg.norm(steps, axis=-1).max(initial=0.0)) * (len(path) - 1)
+        span = float(np.abs(end_rad - start_rad).max(initial=0.0))
+        if length_m < 1e-9:
+            return self.joint_speed_rad_s
+        return min(self.joint_speed_rad_s, span * self.speed_m_s / length_m)
+
+    def check_plan(self, plan: Plan, start_rad: FloatArray) -> tuple[FloatArray, ...]:
+        """Check all views of a plan in their order; returns the joint angles of each.
+
+        Raises
+        ------
+        InputError, SafetyError
+            With every view that cannot be taken, one a line; a `SafetyError` where one of them
+            is refused by a limit.
+        """
+        joints: list[FloatArray] = []
+        refused: list[Exception] = []
+        here = start_rad
+        for index in range(len(plan.file.views)):
+            try:
+                there = self.joints_of(plan, index, here)
+                self.check_move(
+                    here, there, f"{plan.path}: views.{index} ({plan.view_name(index)})"
+                )
+            except (InputError, SafetyError) as refusal:
+                refused.append(refusal)
+                continue
+            joints.append(there)
+            here = there
+        if refused:
+            unsafe = any(isinstance(refusal, SafetyError) for refusal in refused)
+            text = "\n".join(str(refusal) for refusal in refused)
+            raise SafetyError(text) if unsafe else InputError(text)
+        return tuple(joints)
+
+
+def _inside(points_m: FloatArray, box: Box) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    inside = (points_m >= np.array(box.low_m)) & (points_m <= np.array(box.high_m))
+    return np.asarray(inside.all(axis=-1))

@@ -1,0 +1,95 @@
+"""`journal.jsonl`: what a run did, one synced line an event; a resumed run reads it."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from cell.errors import InputError
+from cell.files.plan_file import Plan
+
+FILE_NAME = "journal.jsonl"
+
+
+class Journal:
+    """Appends events: start, resume, retry, skip, frame, stop.
+
+    Raises
+    ------
+    InputError
+        Another process writes this recording now.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        path = folder / FILE_NAME
+        torn = path.exists() and not path.read_bytes().endswith(b"\n")
+        self._file: BinaryIO = path.open("ab")
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._file.close()
+            raise InputError(f"{folder}: another run is writing this recording now") from None
+        if torn:
+            self._file.write(b"\n")
+
+    def write(self, event: str, **values: Any) -> None:
+        """Append one event and sync it to the disk."""
+        now = datetime.now(UTC).isoformat(timespec="milliseconds")
+        line = json.dumps({"event": event, "at": now, **values}, default=str)
+        self._file.write(line.encode() + b"\n")
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        """Let go of the file. Idempotent."""
+        self._file.close()
+
+
+def read_journal(folder: Path) -> list[dict[str, Any]]:
+    """The events of a run; lines that a crash tore are left out."""
+    path = folder / FILE_NAME
+    events = []
+    for line in path.read_bytes().splitlines() if path.exists() else ():
+        try:
+            event = json.loads(line)
+        except ValueError:
+            continue
+        events.append(event)
+    return events
+
+
+def check_same_plan(folder: Path, plan: Plan, *, simulated: bool) -> list[dict[str, Any]]:
+    """The events of the run to go on with.
+
+    Raises
+    ------
+    InputError
+        There is no run to resume, its plan or cell differed, or it was simulated and this is not.
+    """
+    events = read_journal(folder)
+    start = next((event for event in events if event.get("event") == "start"), None)
+    if start is None:
+        raise InputError(f"{folder}: has no {FILE_NAME} of a run to resume. Start it anew.")
+    if start.get("plan_sha256") != plan.sha256:
+        raise InputError(
+            f"{folder}: was begun with another plan or cell than {plan.path} is now; frames of two"
+            " plans are not mixed. Undo the change, or start anew with another -o."
+        )
+    if start.get("simulated") != simulated:
+        kind = "simulated" if start.get("simulated") else "real"
+        raise InputError(
+            f"{folder}: was begun as a {kind} run; simulated and real frames are not mixed."
+            f" {'Add' if start.get('simulated') else 'Leave out'} --dry-run."
+        )
+    return events
+
+
+def skipped_views(events: list[dict[str, Any]]) -> dict[int, str]:
+    """View number to reason, of the views that a run gave up."""
+    return {
+        int(event["view"]): str(event["reason"]) for event in events if event["event"] == "skip"
+    }

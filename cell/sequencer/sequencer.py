@@ -1,0 +1,285 @@
+"""The state machine that owns the arm; its states are drawn in `cell.sequencer.states`.
+
+One thread runs the loop and is the only one that talks to the arm, every few milliseconds. What
+may block (camera, frame check, disk) is done by a worker meanwhile. Whatever goes wrong, the arm
+is stopped before anything else happens.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, wait
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import pairwise
+
+from calib.views import FloatArray
+from cell.errors import BadAnswer, exit_status_of
+from cell.files.plan_file import Plan
+from cell.recording import RecordingWriter
+from cell.sequencer.checks import Verdict, check_frame
+from cell.sequencer.clock import Clock, HostClock
+from cell.sequencer.guard import Guard
+from cell.sequencer.journal import Journal
+from cell.sequencer.progress import Progress, TimeLeft
+from cell.sequencer.shot import Shot
+from cell.sequencer.states import RunResult, State, Status, finish_of
+from cell.sequencer.stop import StopRequest
+from cell.sequencer.watched_arm import WatchedArm, joints_of
+from cell.sequencer.worker import Worker
+from drivers.arm import Arm, ArmState
+from drivers.camera import Camera, FocusSetting, Frame
+from drivers.errors import FrameLost
+
+_LAST_FRAME_S = 30.0
+
+Listener = Callable[[Status], None]
+
+
+@dataclass(frozen=True)
+class Devices:
+    """The arm, the camera, and the clock their `host_t_s` counts on."""
+
+    arm: Arm
+    camera: Camera
+    clock: Clock = field(default_factory=HostClock)
+
+
+class Sequencer:
+    """Runs a plan once; see `run`.
+
+    Parameters
+    ----------
+    plan:
+        The plan and its cell.
+    devices:
+        Arm, camera, clock; connected by the run, and let go by it.
+    writer, journal:
+        Where frames and events go.
+    progress:
+        What a resumed run has behind it; everything lies ahead where not given.
+    started_s:
+        Time of `devices.clock` at which the recording's own clock is 0; now, where not given.
+    stop:
+        Asked to stop by others.
+    listener:
+        Told of every change of state, from the loop's thread; must not block.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        devices: Devices,
+        writer: RecordingWriter,
+        journal: Journal,
+        *,
+        progress: Progress | None = None,
+        started_s: float | None = None,
+        stop: StopRequest | None = None,
+        listener: Listener | None = None,
+    ) -> None:
+        self._plan = plan
+        self._camera, self._clock = devices.camera, devices.clock
+        self._arm = WatchedArm(
+            devices.arm, Guard.of(plan), devices.clock, StopRequest() if stop is None else stop
+        )
+        self._writer, self._journal = writer, journal
+        self._progress = progress or Progress(deque(range(len(plan.file.views))))
+        self._started_s = self._clock.now() if started_s is None else started_s
+        self._listener = listener or (lambda status: None)
+        self._worker = Worker()
+        self._state = State.IDLE
+        self._view = ""
+        self._checking: tuple[Shot, Future[Verdict]] | None = None
+        self._time_left = TimeLeft([0.0] * len(plan.file.views), self._clock.now(), 0)
+
+    def run(self) -> RunResult:
+        """Take every view that is not done yet.
+
+        Returns
+        -------
+        How it ended; errors of devices, limits and input are told there. What nobody foresaw is
+        raised again once the arm has stopped and the journal is closed.
+        """
+        error: BaseException | None = None
+        try:
+            self._connect()
+            self._take_views()
+        except BaseException as fault:
+            error = self._arm.stop(fault)
+            self._tell(State.STOPPING)
+            self._keep_the_frame_in_hand()
+        self._let_go()
+        finish = finish_of(error, len(self._progress.skipped))
+        reason = str(error or "") or (type(error).__name__ if error else "")
+        self._journal.write("stop", finish=finish.name.lower(), reason=reason)
+        self._tell(State.FINISHED)
+        if error is not None and exit_status_of(error) is None:
+            raise error
+        progress = self._progress
+        return RunResult(
+            finish, reason, len(progress.done), dict(progress.skipped), dict(progress.detections)
+        )
+
+    # -- one view after the other ------------------------------------------------------------
+
+    def _connect(self) -> None:
+        self._tell(State.CONNECTING)
+        start = self._arm.connect()
+        joints = self._arm.guard.check_plan(self._plan, start)
+        moves = pairwise((start, *joints))
+        self._time_left = TimeLeft(
+            [self._arm.guard.move_time_s(here, there) for here, there in moves],
+            self._clock.now(),
+            len(self._progress.done) + len(self._progress.skipped),
+        )
+        self._arm.await_job(self._worker.do(self._camera.connect))
+        exposure = self._plan.file.exposure
+        if exposure.exposure_s is not None or exposure.gain_db is not None:
+            configure = partial(
+                self._camera.configure, exposure_s=exposure.exposure_s, gain_db=exposure.gain_db
+            )
+            self._journal.write("configured", **self._arm.await_job(self._worker.do(configure)))
+
+    def _take_views(self) -> None:
+        progress = self._progress
+        self._come_from_the_view_before()
+        while progress.todo or self._checking:
+            if not progress.todo:
+                self._tell(State.CHECKING)
+                self._finish_check()
+                continue
+            index = progress.todo.popleft()
+            came_from = self._go(index)
+            self._finish_check()
+            shot = self._shoot(index, came_from)
+            if shot is not None:
+                self._checking = shot, self._worker.do(partial(self._check_and_log, shot))
+
+    def _come_from_the_view_before(self) -> None:
+        """A resumed run comes to its first view from where an unbroken one would have."""
+        first = self._progress.todo[0] if self._progress.todo else 0
+        if self._progress.done and first > 0:
+            self._go(first - 1)
+
+    def _go(self, index: int) -> FloatArray:
+        """Move to a view and settle there; returns the (6,) joint angles the move came from."""
+        self._view = self._plan.view_name(index)
+        self._tell(State.MOVING)
+        here = joints_of(self._arm.watch())
+        there = self._arm.guard.joints_of(self._plan, index, here)
+        came_from = self._arm.go(there, self._plan.where(index))
+        self._tell(State.SETTLING)
+        self._arm.settle(self._plan.file.settle, self._plan.where(index))
+        return came_from
+
+    def _shoot(self, index: int, came_from: FloatArray) -> Shot | None:
+        """Focus and grab until image and pose belong together; None where the view is given up."""
+        exposure = self._plan.file.exposure
+        focus = partial(self._camera.focus, FocusSetting(exposure.focus, exposure.focus_position))
+        while True:
+            try:
+                self._tell(State.FOCUSING)
+                self._arm.await_job(self._worker.do(focus))
+                self._tell(State.GRABBING)
+                frame, states = self._grab(exposure.timeout_s)
+                shot = Shot(index, frame, states, tuple(came_from.tolist()))
+                fault = shot.pose_fault(self._plan.file.checks)
+            except FrameLost as lost:
+                fault = str(lost)
+            if fault is None:
+                return shot
+            if not self._again(index, fault):
+                return None
+
+    def _grab(self, timeout_s: float) -> tuple[Frame, tuple[ArmState, ...]]:
+        """A frame, and the arm's readings from before its trigger to after it came."""
+        states = [self._arm.watch()]
+        frame = self._arm.await_job(self._worker.do(partial(self._camera.grab, timeout_s)), states)
+        states.append(self._arm.watch())
+        return frame, tuple(states)
+
+    # -- checking and logging, while the arm goes on -----------------------------------------
+
+    def _check_and_log(self, shot: Shot) -> Verdict:
+        """In the worker: judge the picture; a good one is on the disk when this returns."""
+        board = self._plan.cell.board.board()
+        verdict = check_frame(shot.frame.image, board, self._plan.file.checks)
+        if verdict.fault is None:
+            view = self._plan.file.views[shot.index]
+            record = shot.record(view, self._started_s, verdict.detection)
+            self._writer.append(record, shot.frame.image)
+        return verdict
+
+    def _finish_check(self) -> None:
+        """Wait for the check of the frame taken before; a bad one's view is put next in line."""
+        if self._checking is None:
+            return
+        shot, job = self._checking
+        verdict = self._arm.await_job(job)
+        self._checking = None
+        if verdict.fault is None:
+            self._count(shot.index, verdict)
+        elif self._again(shot.index, verdict.fault):
+            self._progress.todo.appendleft(shot.index)
+
+    def _count(self, index: int, verdict: Verdict) -> None:
+        self._progress.done.add(index)
+        if verdict.detection is not None:
+            self._progress.detections[index] = verdict.detection
+        self._journal.write("frame", view=index)
+        self._tell(self._state, f"frame {index} logged ({self._plan.view_name(index)})")
+
+    def _again(self, index: int, fault: str) -> bool:
+        """Whether a view that failed is to be taken again; skips or stops where it is not."""
+        progress, retry = self._progress, self._plan.file.retry
+        progress.attempts[index] = progress.attempts.get(index, 0) + 1
+        name = self._plan.view_name(index)
+        if progress.attempts[index] < retry.attempts:
+            self._journal.write("retry", view=index, reason=fault)
+            self._tell(self._state, f"{name}: {fault}; once more")
+            return True
+        if retry.then == "stop":
+            raise BadAnswer(f"{name}: {fault} (tried {retry.attempts} times; retry.then is stop)")
+        progress.skipped[index] = fault
+        self._journal.write("skip", view=index, reason=fault)
+        self._tell(self._state, f"{name} skipped: {fault}")
+        if not progress.done and len(progress.skipped) >= retry.give_up_after:
+            raise BadAnswer(
+                f"none of the first {len(progress.skipped)} views gave a usable frame; the last"
+                f" one: {fault}. Check board, light and lens with one view before the next run."
+            )
+        return False
+
+    def _keep_the_frame_in_hand(self) -> None:
+        """A whole frame that is being checked as the run ends is logged if it is good."""
+        if self._checking is None:
+            return
+        shot, job = self._checking
+        wait([job], timeout=_LAST_FRAME_S)
+        if job.done() and job.exception() is None and job.result().fault is None:
+            self._count(shot.index, job.result())
+
+    def _let_go(self) -> None:
+        """Release arm and camera; a fault of theirs is journalled and hides nothing."""
+        for name, close in (("arm", self._arm.arm.close), ("camera", self._camera.close)):
+            try:
+                close()
+            except Exception as fault:
+                self._journal.write("close failed", device=name, reason=str(fault))
+
+    def _tell(self, state: State, event: str | None = None) -> None:
+        self._state = state
+        progress = self._progress
+        self._listener(
+            Status(
+                state,
+                self._view,
+                len(progress.done),
+                len(progress.skipped),
+                len(self._plan.file.views),
+                self._time_left.estimate_s(progress, self._clock.now()),
+                event,
+            )
+        )

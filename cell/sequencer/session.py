@@ -1,0 +1,129 @@
+"""A run of a plan into a recording's folder: begun anew, or gone on with."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from cell.files.plan_file import Plan
+from cell.recording import FrameRecord, Header, RecordingWriter
+from cell.sequencer.journal import Journal, check_same_plan, skipped_views
+from cell.sequencer.progress import Progress
+from cell.sequencer.sequencer import Devices, Listener, Sequencer
+from cell.sequencer.states import RunResult
+from cell.sequencer.stop import StopRequest, signals_ask
+
+
+def record_plan(
+    plan: Plan,
+    folder: Path,
+    devices: Devices,
+    *,
+    simulated: bool = False,
+    resume: bool = False,
+    stop: StopRequest | None = None,
+    listener: Listener | None = None,
+) -> RunResult:
+    """Run a plan into `folder`, from the main thread; signals stop it.
+
+    Parameters
+    ----------
+    plan, folder, devices:
+        What to do, where it is recorded, and with what.
+    simulated:
+        Whether the devices are; simulated and real frames are never mixed.
+    resume:
+        Go on with what `folder` has.
+    stop, listener:
+        See `Sequencer`.
+
+    Raises
+    ------
+    InputError
+        A recording is there already, or there is none to resume, or its plan was another.
+    """
+    stop = StopRequest() if stop is None else stop
+    begin = _resume if resume else _begin
+    writer, journal, progress, elapsed_s = begin(plan, folder, simulated)
+    with writer, signals_ask(stop):
+        sequencer = Sequencer(
+            plan,
+            devices,
+            writer,
+            journal,
+            progress=progress,
+            started_s=devices.clock.now() - elapsed_s,
+            stop=stop,
+            listener=listener,
+        )
+        try:
+            return sequencer.run()
+        finally:
+            journal.close()
+
+
+Begun = tuple[RecordingWriter, Journal, Progress, float]
+
+
+def _begin(plan: Plan, folder: Path, simulated: bool) -> Begun:
+    writer = RecordingWriter.create(folder, header_of(plan, simulated=simulated))
+    journal = Journal(folder)
+    journal.write(
+        "start",
+        plan=plan.file.name,
+        plan_sha256=plan.sha256,
+        simulated=simulated,
+        unix_s=time.time(),
+        version=version("calibration-cell"),
+        views=len(plan.file.views),
+    )
+    return writer, journal, Progress(deque(range(len(plan.file.views)))), 0.0
+
+
+def _resume(plan: Plan, folder: Path, simulated: bool) -> Begun:
+    events = check_same_plan(folder, plan, simulated=simulated)
+    journal = Journal(folder)
+    writer, frames = RecordingWriter.resume(folder)
+    done = {frame.frame for frame in frames}
+    skipped = skipped_views(events)
+    todo = [i for i in range(len(plan.file.views)) if i not in done and i not in skipped]
+    journal.write("resume", done=len(done), skipped=len(skipped), todo=len(todo))
+    elapsed_s = _elapsed_s(events, frames, simulated)
+    return writer, journal, Progress(deque(todo), done, skipped), elapsed_s
+
+
+def _elapsed_s(
+    events: list[dict[str, Any]], frames: tuple[FrameRecord, ...], simulated: bool
+) -> float:
+    """Seconds since the recording's clock was 0; a simulated cell's time stood still meanwhile."""
+    if simulated:
+        return max((frame.t_s for frame in frames if frame.t_s is not None), default=0.0)
+    return max(0.0, time.time() - float(events[0]["unix_s"]))
+
+
+def header_of(plan: Plan, *, simulated: bool, images: bool = True) -> Header:
+    """The `recording.yaml` of a plan's recording."""
+    cell = plan.cell
+    return Header.model_validate(
+        {
+            "schema": "cell.recording/1",
+            "name": f"{plan.file.name}{' (simulated)' if simulated else ''}",
+            "robot": {"model": cell.robot.model, "payload_kg": cell.robot.payload_kg},
+            "camera": {
+                "model": cell.camera.model,
+                "width": cell.camera.width,
+                "height": cell.camera.height,
+                "pixel_size_um": cell.camera.pixel_size_um,
+                "focus": cell.camera.focus,
+            },
+            "board": cell.board.model_dump(),
+            "mount": cell.mount,
+            "capture": {"mode": "stop"},
+            "images": "images/" if images else None,
+            "simulated": simulated,
+            "plan": {"name": plan.file.name, "sha256": plan.sha256},
+        }
+    )

@@ -1,0 +1,150 @@
+"""The arm under watch: every wait polls it, and whatever goes wrong stops it first."""
+
+from __future__ import annotations
+
+import sys
+from concurrent.futures import Future, wait
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+
+from calib.views import FloatArray
+from cell.errors import StoppedByOperator
+from cell.files.plan_file import Settle
+from cell.sequencer.clock import Clock
+from cell.sequencer.guard import Guard
+from cell.sequencer.stop import StopRequest
+from drivers.arm import Arm, ArmState, Motion
+from drivers.errors import ArmStopped, DeviceError, StopFailed
+
+POLL_S = 0.008
+STOP_ORDERS = 3
+_ARRIVED_RAD = 0.02
+_MOVE_PATIENCE = 3.0
+_MOVE_SLACK_S = 15.0
+
+Result = TypeVar("Result")
+
+
+@dataclass
+class WatchedArm:
+    """Moves an arm as the guard allows, from one thread, a few milliseconds at a time.
+
+    Attributes
+    ----------
+    arm, guard, clock:
+        The arm, what it may do, and the clock its `host_t_s` counts on.
+    stop_request:
+        Looked at in every wait.
+    connected:
+        Whether `connect` succeeded: from then on every fault stops the arm.
+    """
+
+    arm: Arm
+    guard: Guard
+    clock: Clock
+    stop_request: StopRequest
+    connected: bool = field(default=False, init=False)
+
+    def connect(self) -> FloatArray:
+        """Open the link; returns the (6,) joint angles the arm stands at."""
+        self.arm.connect()
+        self.connected = True
+        return joints_of(self.watch())
+
+    def watch(self) -> ArmState:
+        """The arm's state.
+
+        Raises
+        ------
+        StoppedByOperator
+            Somebody asked for a stop.
+        ArmStopped, DeviceUnreachable
+            The arm stopped by itself, or its readings are stale.
+        """
+        if self.stop_request.asked:
+            raise StoppedByOperator(f"stopped by {self.stop_request.reason}")
+        state = self.arm.state()
+        if state.motion is Motion.STOPPED_BY_FAULT:
+            raise ArmStopped(state.fault or "the arm stopped by itself and does not say why")
+        return state
+
+    def await_job(self, job: Future[Result], states: list[ArmState] | None = None) -> Result:
+        """A job's result, the arm being watched meanwhile; its readings go to `states`."""
+        while not job.done():
+            state = self.watch()
+            if states is not None:
+                states.append(state)
+            wait([job], timeout=POLL_S)
+        return job.result()
+
+    def go(self, there: FloatArray, where: str) -> FloatArray:
+        """Move to (6,) joint angles; returns those the move came from.
+
+        Raises
+        ------
+        SafetyError
+            The guard refuses the move; the arm has not moved.
+        DeviceError
+            It does not arrive.
+        """
+        here = joints_of(self.watch())
+        target = self.guard.target(here, there, where)
+        ordered_s = self.clock.now()
+        self.arm.start_move(target)
+        patience_s = _MOVE_PATIENCE * self.guard.move_time_s(here, there) + _MOVE_SLACK_S
+        while True:
+            self.clock.sleep(POLL_S)
+            state = self.watch()
+            off = float(np.abs(joints_of(state) - there).max())
+            if state.host_t_s > ordered_s and state.motion is Motion.STEADY and off < _ARRIVED_RAD:
+                return here
+            if self.clock.now() - ordered_s > patience_s:
+                raise DeviceError(
+                    f"{where}: the arm did not arrive within {patience_s:.0f} s; the joint farthest"
+                    f" from its target is {np.degrees(off):.1f}° off. Look what holds it up."
+                )
+
+    def settle(self, settle: Settle, where: str) -> None:
+        """Wait until the arm has told for long enough that it stands still."""
+        began_s = self.clock.now()
+        still_since_s: float | None = None
+        while True:
+            state = self.watch()
+            if state.motion is not Motion.STEADY:
+                still_since_s = None
+            elif still_since_s is None:
+                still_since_s = state.host_t_s
+            if still_since_s is not None and state.host_t_s - still_since_s >= settle.still_s:
+                return
+            if self.clock.now() - began_s > settle.timeout_s:
+                raise DeviceError(
+                    f"{where}: the arm does not come to rest within {settle.timeout_s:.0f} s."
+                    " Check its payload setting and its mounting."
+                )
+            self.clock.sleep(POLL_S)
+
+    def stop(self, fault: BaseException) -> BaseException:
+        """Stop the arm before all else; returns what the operator must be told first."""
+        failure: Exception | None = None
+        for _ in range(STOP_ORDERS if self.connected else 0):
+            try:
+                self.arm.stop()
+            except Exception as refusal:
+                failure = refusal
+            else:
+                return fault
+        if failure is None:
+            return fault
+        text = f"THE ARM DID NOT CONFIRM ITS STOP ({failure}). PRESS THE EMERGENCY STOP NOW."
+        sys.stderr.write(f"\a\n*** {text} ***\n")
+        sys.stderr.flush()
+        return StopFailed(f"{text} It was to be stopped because: {fault}")
+
+
+def joints_of(state: ArmState) -> FloatArray:
+    """(6,) joint angles; raises `DeviceError` for an arm that does not tell them."""
+    if state.joints_rad is None:
+        raise DeviceError("the arm does not tell its joint angles; a run cannot be checked")
+    return np.asarray(state.joints_rad, dtype=float)

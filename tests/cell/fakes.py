@@ -1,0 +1,119 @@
+"""The smallest arm and camera a sequencer can be tried on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from calib.chain.kinematics import arm
+from drivers.arm import ArmState, Motion, MoveTarget
+from drivers.camera import FocusSetting, Frame
+
+HOME = np.radians([0, -90, 90, -90, -90, 0])
+
+
+class FastClock:
+    """Time that passes only when somebody sleeps."""
+
+    def __init__(self) -> None:
+        self.t_s = 100.0
+
+    def now(self) -> float:
+        return self.t_s
+
+    def sleep(self, seconds: float) -> None:
+        self.t_s += seconds
+
+
+class FakeArm:
+    """Moves straight in joint space at the ordered speed."""
+
+    tried_on_hardware = False
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self.now = now
+        self.start = self.end = HOME
+        self.began_s, self.takes_s = now(), 0.0
+        self.calls: list[str] = []
+        self.stopped_s: float | None = None
+        self.fault: str | None = None
+        self.stop_error: Exception | None = None
+        self.drift_rad = 0.0
+
+    def connect(self) -> None:
+        self.calls.append("connect")
+
+    @property
+    def share(self) -> float:
+        return min(1.0, (self.now() - self.began_s) / self.takes_s) if self.takes_s else 1.0
+
+    @property
+    def moving(self) -> bool:
+        return self.share < 1.0
+
+    def state(self) -> ArmState:
+        joints = self.start + self.share * (self.end - self.start) + self.drift_rad
+        motion = Motion.MOVING if self.moving else Motion.STEADY
+        return ArmState(
+            host_t_s=self.now(),
+            controller_t_s=None,
+            joints_rad=tuple(joints.tolist()),
+            joint_velocity_rad_s=(0.0,) * 6,
+            base_from_flange=RigidTransform.from_matrix(arm("ur5e").forward(joints)),
+            motion=Motion.STOPPED_BY_FAULT if self.fault else motion,
+            fault=self.fault,
+        )
+
+    def start_move(self, target: MoveTarget) -> None:
+        self.calls.append("move")
+        self.start, self.end = self.end, np.array(target.joints_rad)
+        self.began_s = self.now()
+        self.takes_s = float(np.abs(self.end - self.start).max()) / target.joint_speed_rad_s
+
+    def stop(self) -> None:
+        self.calls.append("stop")
+        if self.stop_error is not None:
+            raise self.stop_error
+        self.stopped_s = self.stopped_s or self.now()
+        self.start = self.end = self.start + self.share * (self.end - self.start)
+        self.takes_s = 0.0
+
+    def close(self) -> None:
+        self.calls.append("close")
+
+
+class FakeCamera:
+    """Its pictures carry their number; `grabs` may hold exceptions to raise."""
+
+    tried_on_hardware = False
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self.now = now
+        self.calls: list[str] = []
+        self.grabs: list[Exception | None] = []
+        self.lag_s = 0.0
+
+    def connect(self) -> None:
+        self.calls.append("connect")
+
+    def configure(
+        self, *, exposure_s: float | None = None, gain_db: float | None = None
+    ) -> Mapping[str, float]:
+        return {"exposure_s": exposure_s or 0.0}
+
+    def focus(self, setting: FocusSetting) -> float | None:
+        return None
+
+    def grab(self, timeout_s: float) -> Frame:
+        self.calls.append("grab")
+        fault = self.grabs.pop(0) if self.grabs else None
+        if fault is not None:
+            raise fault
+        image = np.full((48, 64), len(self.calls), np.uint8)
+        return Frame(image, self.now() - self.lag_s, exposure_s=0.01, raw={"id": len(self.calls)})
+
+    def close(self) -> None:
+        self.calls.append("close")

@@ -1,0 +1,275 @@
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cell.errors import EXIT_BAD_ANSWER, EXIT_DEVICE, EXIT_INPUT, EXIT_OPERATOR, EXIT_SAFETY
+from cell.files.plan_file import Plan, read_plan
+from cell.recording import Header, RecordingWriter, read_recording
+from cell.sequencer import sequencer as sequencer_module
+from cell.sequencer.checks import Verdict
+from cell.sequencer.clock import HostClock
+from cell.sequencer.journal import Journal, read_journal
+from cell.sequencer.progress import Progress
+from cell.sequencer.sequencer import Devices, Sequencer
+from cell.sequencer.states import Finish, RunResult, State, Status
+from cell.sequencer.stop import StopRequest, signals_ask
+from drivers.camera import Frame
+from drivers.errors import DeviceUnreachable, FrameLost, StopFailed
+from tests.cell.fakes import FakeArm, FakeCamera, FastClock
+from tests.cell.plans import CELL, PLAN
+
+NO_BOARD = "checks: {board: false}\n"
+
+
+class Bench:
+    """A plan, fakes, and what a run of them left."""
+
+    def __init__(self, folder: Path, plan: str = PLAN + NO_BOARD, *, real: bool = False) -> None:
+        (folder / "bench.yaml").write_text(CELL)
+        (folder / "plan.yaml").write_text(plan)
+        self.folder = folder / "run"
+        self.clock = HostClock() if real else FastClock()
+        self.arm = FakeArm(self.clock.now)
+        self.camera = FakeCamera(self.clock.now)
+        self.plan: Plan = read_plan(folder / "plan.yaml")
+        self.stop = StopRequest()
+        self.told: list[Status] = []
+
+    def run(self, progress: Progress | None = None) -> RunResult:
+        header = {"schema": "cell.recording/1", "board": self.plan.cell.board.model_dump()}
+        header["images"] = "images/"
+        writer = RecordingWriter.create(self.folder, Header.model_validate(header))
+        devices = Devices(self.arm, self.camera, self.clock)
+        with writer:
+            sequencer = Sequencer(
+                self.plan,
+                devices,
+                writer,
+                Journal(self.folder),
+                progress=progress,
+                stop=self.stop,
+                listener=self.told.append,
+            )
+            return sequencer.run()
+
+    def events(self) -> list[str]:
+        return [event["event"] for event in read_journal(self.folder)]
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path)
+
+
+@pytest.fixture
+def real_bench(tmp_path: Path) -> Iterator[Bench]:
+    bench = Bench(tmp_path, PLAN.replace("0.2", "0.05") + NO_BOARD, real=True)
+    with signals_ask(bench.stop):
+        yield bench
+
+
+def test_every_view_is_logged_with_the_pose_of_its_frame(bench: Bench) -> None:
+    result = bench.run()
+    assert (result.finish, result.frames, result.reason) == (Finish.COMPLETED, 4, "")
+    recording = read_recording(bench.folder)
+    assert [frame.frame for frame in recording.frames] == [0, 1, 2, 3]
+    for frame, view in zip(recording.frames, bench.plan.file.views, strict=True):
+        assert frame.joints_rad == pytest.approx(view.joints())
+    assert recording.frames[2].approach_joints_rad == pytest.approx(
+        bench.plan.file.views[1].joints()
+    )
+    assert [int(recording.image(frame)[0, 0]) for frame in recording.frames] == [2, 3, 4, 5]
+    times = [frame.t_s for frame in recording.frames]
+    assert times == sorted(times)
+    assert bench.arm.calls[-1] == bench.camera.calls[-1] == "close"
+    assert [status.state for status in bench.told][-1] is State.FINISHED
+    assert bench.told[-3].left_s is not None
+
+
+def test_moves_stay_below_the_plans_speed(bench: Bench) -> None:
+    kinematics_speeds = []
+    start_move = bench.arm.start_move
+
+    def watched(target):  # type: ignore[no-untyped-def]
+        start_move(target)
+        before = bench.arm.state().base_from_flange.translation
+        bench.clock.sleep(0.01)
+        after = bench.arm.state().base_from_flange.translation
+        kinematics_speeds.append(np.linalg.norm(after - before) / 0.01)
+
+    bench.arm.start_move = watched  # type: ignore[method-assign]
+    bench.run()
+    assert max(kinematics_speeds) < 0.2001
+    assert max(kinematics_speeds) > 0.15
+
+
+def test_a_camera_that_dies_stops_the_arm_first(bench: Bench) -> None:
+    bench.camera.grabs = [None, DeviceUnreachable("camera at 10.0.0.2 does not answer")]
+    order: list[str] = []
+    bench.arm.stop, arm_stop = lambda: (order.append("arm stop"), arm_stop()), bench.arm.stop  # type: ignore
+    bench.camera.close = lambda: order.append("camera close")  # type: ignore[method-assign]
+    result = bench.run()
+    assert order == ["arm stop", "camera close"]
+    assert result.finish is Finish.DEVICE_FAILED
+    assert result.finish.exit_status == EXIT_DEVICE
+    assert "10.0.0.2" in result.reason
+    assert len(read_recording(bench.folder).frames) == 1
+    assert bench.events()[-1] == "stop"
+
+
+def test_an_unforeseen_error_stops_the_arm_and_is_raised_again(bench: Bench) -> None:
+    bench.camera.grabs = [ZeroDivisionError("a bug")]
+    with pytest.raises(ZeroDivisionError):
+        bench.run()
+    assert "stop" in bench.arm.calls
+    assert bench.events()[-1] == "stop"
+
+
+def test_a_failing_stop_is_the_loudest_error(
+    bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench.camera.grabs = [DeviceUnreachable("gone")]
+    bench.arm.stop_error = StopFailed("link closed")
+    result = bench.run()
+    assert result.finish.exit_status == EXIT_SAFETY
+    assert "PRESS THE EMERGENCY STOP" in capsys.readouterr().err
+    assert "gone" in result.reason
+    assert bench.arm.calls.count("stop") == 3
+
+
+def test_no_stop_is_ordered_from_an_arm_that_was_never_reached(bench: Bench) -> None:
+    def unreachable() -> None:
+        raise DeviceUnreachable("no robot at 10.0.0.1")
+
+    bench.arm.connect = unreachable  # type: ignore[method-assign]
+    bench.arm.stop_error = StopFailed("not connected")
+    assert bench.run().finish is Finish.DEVICE_FAILED
+
+
+def test_an_arm_that_stops_by_itself_ends_the_run(bench: Bench) -> None:
+    bench.camera.focus = lambda setting: setattr(bench.arm, "fault", "protective stop")  # type: ignore
+    result = bench.run()
+    assert result.finish is Finish.DEVICE_FAILED
+    assert "protective stop" in result.reason
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_stops_a_moving_arm_within_100_ms(real_bench: Bench, number: int) -> None:
+    sent: list[float] = []
+
+    def send() -> None:
+        while not real_bench.arm.moving:
+            time.sleep(0.001)
+        time.sleep(0.05)
+        sent.append(time.monotonic())
+        os.kill(os.getpid(), number)
+
+    threading.Thread(target=send).start()
+    result = real_bench.run()
+    assert result.finish is Finish.STOPPED_BY_OPERATOR
+    assert result.finish.exit_status == EXIT_OPERATOR
+    assert real_bench.arm.stopped_s is not None
+    assert real_bench.arm.stopped_s - sent[0] < 0.1
+    assert ("Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name) in result.reason
+
+
+def test_the_operator_is_heard_while_the_camera_hangs(real_bench: Bench) -> None:
+    hang = threading.Event()
+    grab = real_bench.camera.grab
+    real_bench.camera.grab = lambda timeout_s: (hang.wait(20), grab(timeout_s))[1]  # type: ignore
+    threading.Timer(0.2, lambda: real_bench.stop.ask("the Stop button")).start()
+    began_s = time.monotonic()
+    result = real_bench.run()
+    hang.set()
+    assert result.finish is Finish.STOPPED_BY_OPERATOR
+    assert time.monotonic() - began_s < 2.0
+
+
+def test_a_lost_frame_is_taken_again_at_the_same_place(bench: Bench) -> None:
+    bench.camera.grabs = [FrameLost("incomplete"), None]
+    result = bench.run()
+    assert (result.finish, result.frames) == (Finish.COMPLETED, 4)
+    assert bench.arm.calls.count("move") == 4
+    assert bench.events().count("retry") == 1
+
+
+def test_a_view_without_a_frame_is_skipped_with_its_reason(bench: Bench) -> None:
+    bench.camera.grabs = [None] + [FrameLost("incomplete")] * 3
+    result = bench.run()
+    assert result.finish is Finish.COMPLETED_WITH_LOSSES
+    assert result.finish.exit_status == EXIT_BAD_ANSWER
+    assert result.skipped == {1: "incomplete"}
+    assert [frame.frame for frame in read_recording(bench.folder).frames] == [0, 2, 3]
+
+
+def test_a_frame_older_than_the_standstill_is_refused(bench: Bench) -> None:
+    bench.camera.lag_s = 5.0
+    result = bench.run()
+    assert "lies outside the time the arm stood still" in result.skipped[0]
+
+
+def test_poses_that_do_not_agree_are_refused(bench: Bench) -> None:
+    grab = bench.camera.grab
+
+    def jolt(timeout_s: float) -> Frame:
+        bench.arm.drift_rad += 1e-3
+        return grab(timeout_s)
+
+    bench.camera.grab = jolt  # type: ignore[method-assign]
+    result = bench.run()
+    assert "poses before and after the exposure differ by" in next(iter(result.skipped.values()))
+
+
+def test_a_frame_that_fails_its_check_is_taken_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verdicts = deque([Verdict("blurred"), Verdict(None), Verdict("blurred"), Verdict("dark")])
+    monkeypatch.setattr(
+        sequencer_module,
+        "check_frame",
+        lambda *args: verdicts.popleft() if verdicts else Verdict(None),
+    )
+    bench = Bench(tmp_path, PLAN + "retry: {attempts: 2}\n")
+    result = bench.run()
+    assert result.skipped == {0: "blurred"}
+    assert [frame.frame for frame in read_recording(bench.folder).frames] == [1, 3, 2]
+    reasons = [event["reason"] for event in read_journal(bench.folder) if event["event"] == "retry"]
+    assert reasons == ["blurred", "dark"]
+
+
+def test_a_board_that_is_nowhere_ends_the_run_early(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, PLAN + "retry: {attempts: 1, give_up_after: 2}\n")
+    result = bench.run()
+    assert result.finish is Finish.GIVEN_UP
+    assert "board not found" in result.reason
+    assert len(result.skipped) == 2
+
+
+@pytest.mark.parametrize(
+    ("view", "status", "message"),
+    [
+        ("{base_from_flange: {p_m: [2, 0, 0.5], q_xyzw: [0, 1, 0, 0]}}", EXIT_INPUT, "unreachable"),
+        ("{joints_deg: [0, -90, 90, -90, -90, 400]}", EXIT_SAFETY, "joint 6 at 400.0° is outside"),
+        ("{joints_deg: [0, 30, 0, -90, -90, 0]}", EXIT_SAFETY, "leave the workspace"),
+        ("{joints_deg: [-45, -45, 30, -75, -90, 0]}", EXIT_SAFETY, "keep-out box `cabinet`"),
+    ],
+)
+def test_a_plan_with_a_bad_view_is_refused_before_the_first_move(
+    tmp_path: Path, view: str, status: int, message: str
+) -> None:
+    plan = PLAN + f"- {view}\n"
+    bench = Bench(tmp_path, plan)
+    result = bench.run()
+    assert result.finish.exit_status == status
+    assert message in result.reason
+    assert "views.4 (view 4)" in result.reason
+    assert "move" not in bench.arm.calls
