@@ -45,6 +45,8 @@ class Noise:
 
 LEAST = Noise(1e-4, 1e-7, 1e-7, 1e-7)
 MOST = Noise(50.0, 0.3, 1.0, 5e-3)
+START_AT_LEAST = Noise(1e-3, 1e-5, 1e-5, 3e-6)
+"""Below these the likelihood is flat: a search that starts there never finds its way back."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +156,8 @@ def estimate_noise(
     """Noise levels that make the data most likely, and -2 log likelihood there."""
     with_print = equations.corner_numbers > 0
     low, high = _vector(LEAST, with_print), _vector(MOST, with_print)
-    start = np.clip(_vector(guess, with_print), low + 0.1, high - 0.1)
+    start = np.maximum(_vector(guess, with_print), _vector(START_AT_LEAST, with_print))
+    start = np.minimum(start, high - 0.1)
 
     def cost(levels: FloatArray) -> float:
         return profile(equations, Noise(*np.exp(levels)), restricted=restricted).minus_two_log

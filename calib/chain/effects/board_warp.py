@@ -11,7 +11,7 @@ def _act(values: FloatArray, walk: Walk) -> None:
     board = walk.views.board
     x = walk.points_m[:, 0] / ((board.cols - 1) * board.square_m) * 2.0 - 1.0
     y = walk.points_m[:, 1] / ((board.rows - 1) * board.square_m) * 2.0 - 1.0
-    height = values[0] * (1.0 - x * x) + values[1] * (1.0 - y * y) + values[2] * x * y
+    height = values[0] * (x * x - 1.0) + values[1] * (y * y - 1.0) + values[2] * x * y
     walk.points_m[:, 2] += height
 
 
@@ -19,7 +19,7 @@ EFFECT = Effect(
     name="board_warp",
     link="board",
     physics="The board is not flat: it is bent like a sheet or twisted.",
-    equation="z = bend_x_m (1 - x^2) + bend_y_m (1 - y^2) + twist_m x y, x and y from -1 to 1",
+    equation="z = bend_x_m (x^2 - 1) + bend_y_m (y^2 - 1) + twist_m x y, x and y from -1 to 1",
     source="second-order plate shape, as in mrcal's calibration-object model",
     parameters=(
         Parameter("bend_x_m", "m", 3e-4, -0.02, 0.02),

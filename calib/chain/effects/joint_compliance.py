@@ -11,7 +11,7 @@ def _act(values: FloatArray, walk: Walk) -> None:
     if walk.arm is None:
         return
     payload_kg = walk.views.payload_kg or 0.0
-    walk.joints_rad = walk.joints_rad + values * walk.arm.gravity_torques(
+    walk.joints_rad = walk.joints_rad - values * walk.arm.gravity_torques(
         walk.views.joints_rad, payload_kg
     )
 
@@ -20,7 +20,7 @@ EFFECT = Effect(
     name="joint_compliance",
     link="arm",
     physics="The joints sag under the weight of arm and camera, each in proportion to its load.",
-    equation="q_true = q_logged + rad_per_Nm * gravity_torque(q)",
+    equation="q_true = q_logged - rad_per_Nm * holding_torque(q)",
     source="Klimchik, Pashkevich, Chablat 2013 (virtual joint model, static load)",
     parameters=tuple(
         Parameter(f"rad_per_Nm_{j}", "rad/Nm", 2e-5, -1e-3, 1e-3, identifiable=1 < j < 6)

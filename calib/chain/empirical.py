@@ -1,0 +1,260 @@
+"""An effect without a name: some place of the chain follows some covariate along a smooth curve.
+
+It carries what no known physics explains, so that the twin still predicts, and it is what the
+locating tests are made of (varying-coefficient score tests).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from calib.chain import rigid
+from calib.chain.effect import Effect, Link, Parameter, Present
+from calib.chain.walk import Walk
+from calib.views import FloatArray, Views
+
+LEGENDRE_TERMS = 4
+HARMONICS = 3
+
+
+@dataclass(frozen=True)
+class Site:
+    """A place in the chain whose constant might not be one.
+
+    Attributes
+    ----------
+    name, link:
+        What it is called, and the link it belongs to.
+    acts_in:
+        The link at whose turn it acts.
+    components:
+        (name, unit, typical size) of each number.
+    shift:
+        Applies (N, D) amounts to the walk.
+    """
+
+    name: str
+    link: Link
+    acts_in: Link
+    components: tuple[tuple[str, str, float], ...]
+    shift: Callable[[FloatArray, Walk], None]
+
+
+def _joint(index: int) -> Site:
+    def shift(amount: FloatArray, walk: Walk) -> None:
+        walk.joints_rad = walk.joints_rad.copy()
+        walk.joints_rad[:, index] += amount[:, 0]
+
+    name = f"joint_{index + 1}"
+    return Site(name, "arm", "arm", ((name, "rad", 3e-4),), shift)
+
+
+def _flange(amount: FloatArray, walk: Walk) -> None:
+    walk.base_from_flange = walk.base_from_flange @ rigid.from_vector(amount)
+
+
+def _mounted(amount: FloatArray, walk: Walk) -> None:
+    walk.flange_from_mounted = walk.flange_from_mounted @ rigid.from_vector(amount)
+
+
+def _fixed(amount: FloatArray, walk: Walk) -> None:
+    walk.base_from_fixed = walk.base_from_fixed @ rigid.from_vector(amount)
+
+
+def _focal(amount: FloatArray, walk: Walk) -> None:
+    walk.column("alpha_px")[:] *= 1.0 + amount[:, 0]
+    walk.column("beta_px")[:] *= 1.0 + amount[:, 0]
+
+
+def _principal(amount: FloatArray, walk: Walk) -> None:
+    walk.column("u0_px")[:] += amount[:, 0]
+    walk.column("v0_px")[:] += amount[:, 1]
+
+
+def _radial(amount: FloatArray, walk: Walk) -> None:
+    walk.column("k1")[:] += amount[:, 0]
+
+
+_RIGID = tuple(
+    [(f"{axis}_m", "m", 3e-4) for axis in "xyz"] + [(f"r{axis}_rad", "rad", 3e-4) for axis in "xyz"]
+)
+SITES: tuple[Site, ...] = (
+    *(_joint(k) for k in range(6)),
+    Site("flange_pose", "arm", "mount", _RIGID, _flange),
+    Site("mounted_pose", "mount", "mount", _RIGID, _mounted),
+    Site("fixed_pose", "board", "board", _RIGID, _fixed),
+    Site("focal_length", "lens", "lens", (("relative", "1", 1e-3),), _focal),
+    Site("principal_point", "lens", "lens", (("u_px", "px", 1.0), ("v_px", "px", 1.0)), _principal),
+    Site("radial_distortion", "lens", "lens", (("k1", "1", 1e-3),), _radial),
+)
+
+
+def site_named(name: str) -> Site:
+    """Return the site of that name; raises KeyError."""
+    return next(site for site in SITES if site.name == name)
+
+
+@dataclass(frozen=True)
+class Covariate:
+    """Something a frame is known by.
+
+    Attributes
+    ----------
+    name, unit:
+        As told to the reader.
+    of:
+        (N,) or (N, D) values from the walk; NaN where not known.
+    cyclic:
+        An angle whose full turn comes back to itself.
+    link:
+        The earliest link at whose turn the values exist.
+    """
+
+    name: str
+    unit: str
+    of: Callable[[Walk], FloatArray]
+    cyclic: bool = False
+
+
+def _logged(column: str) -> Callable[[Walk], FloatArray]:
+    return lambda walk: np.asarray(getattr(walk.views, column))
+
+
+def _logged_joint(column: str, index: int) -> Callable[[Walk], FloatArray]:
+    return lambda walk: np.asarray(getattr(walk.views, column)[:, index])
+
+
+def _approach(index: int) -> Callable[[Walk], FloatArray]:
+    return lambda walk: np.sign(
+        walk.views.joints_rad[:, index] - walk.views.approach_joints_rad[:, index]
+    )
+
+
+def _nominal_distance(walk: Walk) -> FloatArray:
+    if walk.camera_from_board.size:
+        return walk.distance_m
+    pose = rigid.inverse(walk.base_from_camera) @ walk.base_from_board
+    return np.asarray(pose[:, 2, :3] @ walk.points_m.mean(axis=0) + pose[:, 2, 3])
+
+
+def _tilt(walk: Walk) -> FloatArray:
+    pose = rigid.inverse(walk.base_from_camera) @ walk.base_from_board
+    return np.asarray(np.arccos(np.clip(np.abs(pose[:, 2, 2]), 0.0, 1.0)))
+
+
+def _gravity(walk: Walk) -> FloatArray:
+    return walk.gravity_in_camera()
+
+
+COVARIATES: tuple[Covariate, ...] = (
+    Covariate("distance", "m", _nominal_distance),
+    Covariate("tilt", "rad", _tilt),
+    Covariate("time", "s", _logged("t_s")),
+    Covariate("order", "frame", lambda walk: walk.views.frame.astype(np.float64)),
+    Covariate("gravity", "g", _gravity),
+    Covariate("temperature", "degC", _logged("temperature_c")),
+    Covariate("focus_position", "steps", _logged("focus_position")),
+    *(Covariate(f"joint_{k + 1}", "rad", _logged_joint("joints_rad", k), True) for k in range(6)),
+    *(
+        Covariate(f"velocity_{k + 1}", "rad/s", _logged_joint("joint_velocity_rad_s", k))
+        for k in range(6)
+    ),
+    *(Covariate(f"approach_{k + 1}", "sign", _approach(k)) for k in range(6)),
+)
+
+
+def covariate_named(name: str) -> Covariate:
+    """Return the covariate of that name; raises KeyError."""
+    return next(c for c in COVARIATES if c.name == name)
+
+
+def basis(covariate: Covariate, value: FloatArray, low: float, high: float) -> FloatArray:
+    """(N, B) smooth functions of the covariate, without the constant; zero where it is NaN."""
+    known = np.isfinite(value).all(axis=1) if value.ndim == 2 else np.isfinite(value)
+    safe = np.where(np.isfinite(value), value, 0.0)
+    if value.ndim == 2:
+        return safe * known[:, None]
+    if covariate.name.startswith("approach"):
+        return (safe * known)[:, None]
+    if covariate.cyclic and high - low > np.pi:
+        waves = [f(k * safe) for k in range(1, HARMONICS + 1) for f in (np.sin, np.cos)]
+        return np.stack(waves, axis=1) * known[:, None]
+    unit = np.clip(2.0 * (safe - low) / max(high - low, 1e-12) - 1.0, -1.2, 1.2)
+    return legvander(unit, LEGENDRE_TERMS)[:, 1:] * known[:, None]
+
+
+def wave(value: FloatArray, period: float) -> FloatArray:
+    """(N, 2) sine and cosine of that period; zero where the value is NaN."""
+    phase = 2.0 * np.pi * np.nan_to_num(value) / period
+    known = np.isfinite(value)[:, None]
+    return np.stack([np.sin(phase), np.cos(phase)], axis=1) * known
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Which site follows which covariate, and over what range or with what period."""
+
+    site: Site
+    covariate: Covariate
+    low: float
+    high: float
+    period: float | None = None
+
+    def functions(self, walk: Walk) -> FloatArray:
+        """(N, B) of the curve's functions."""
+        value = self.covariate.of(walk)
+        if self.period is not None:
+            return wave(value, self.period)
+        return basis(self.covariate, value, self.low, self.high)
+
+
+def empirical(curve: Curve, functions: int) -> Effect:
+    """An effect by which the site follows the covariate along that many functions."""
+    site = curve.site
+
+    def act(values: FloatArray, walk: Walk) -> None:
+        if not values.any():
+            return
+        amounts = curve.functions(walk) @ values.reshape(functions, len(site.components))
+        site.shift(amounts, walk)
+
+    return Effect(
+        name="empirical",
+        law=f"{site.name}/{curve.covariate.name}",
+        link=site.acts_in,
+        physics=(
+            f"Something that no known effect accounts for moves the {site.name.replace('_', ' ')}"
+            f" with the {curve.covariate.name.replace('_', ' ')}."
+        ),
+        equation=f"{site.name} = constant + curve({curve.covariate.name})",
+        source="varying-coefficient model (Hastie, Tibshirani 1993)",
+        parameters=tuple(
+            Parameter(f"c{b}_{name}", unit, typical, -1e3, 1e3)
+            for b in range(functions)
+            for name, unit, typical in site.components
+        ),
+        act=act,
+        remedy="Find out what changes with it; until then the twin carries the curve.",
+    )
+
+
+def span(values: FloatArray) -> tuple[float, float]:
+    """Range of the finite values; (0, 0) where there are none."""
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+
+
+def present_curve(curve: Curve, walk: Walk) -> Present:
+    """The curve as an effect with all amounts zero, sized for this walk."""
+    effect = empirical(curve, curve.functions(walk).shape[1])
+    return Present(effect, effect.values({}))
+
+
+def site_columns(views: Views) -> tuple[Site, ...]:
+    """The sites that this recording can move: joints only where they were logged."""
+    joints = np.isfinite(views.joints_rad).any() and views.robot_model is not None
+    return tuple(s for s in SITES if joints or not s.name.startswith("joint_"))

@@ -1,0 +1,167 @@
+"""Forward selection: the effect that the data demand most, then the next, until none is left.
+
+Grouped likelihood-ratio tests with a Bayesian price, data counted as six numbers a frame. Score
+tests rank the catalogue; the best few are fitted in earnest, noise levels and all, and compared
+by their likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.chain.effect import Present
+from calib.chain.kinematics import ArmKinematics
+from calib.chain.model import CellModel
+from calib.discovery.candidates import Candidate, candidates, finer
+from calib.discovery.score import Score, bic, score_effects
+from calib.solver.joint import JointFit, fit_joint
+from calib.solver.unknowns import unknowns_of
+from calib.views import Views
+
+DEMAND = 8.0
+"""An effect must lower the Bayesian criterion by this much to be named."""
+
+UNDECIDED = 6.0
+"""Rivals within this much of the best cannot be told apart by these data."""
+
+_FITTED_IN_EARNEST = 6
+_MOST_EFFECTS = 6
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A model fitted in earnest, and its Bayesian criterion (lower is better)."""
+
+    fit: JointFit
+    criterion: float
+    choices: int = 1
+
+
+@dataclass(frozen=True)
+class Step:
+    """One effect taken in: the trial with it, its rivals, what it lowered the criterion by."""
+
+    taken: Present
+    trial: Trial
+    demand: float
+    rivals: tuple[tuple[Present, float], ...]
+
+
+def criterion(fit: JointFit, views: Views, choices: int = 1) -> float:
+    """-2 log likelihood and the price of the free numbers, and of picking among shapes."""
+    return -bic(-fit.minus_two_log, fit.parameters, views) + 2.0 * float(np.log(choices))
+
+
+def fit_with(
+    start: JointFit, views: Views, effects: Sequence[Present], kinematics: ArmKinematics | None
+) -> JointFit:
+    """Fit a cell with these effects, from where another fit stands."""
+    model = start.model.with_effects(effects)
+    return fit_joint(
+        model,
+        views,
+        unknowns_of(model),
+        start.noise,
+        flange_error=start.flange_error,
+        kinematics=kinematics,
+    )
+
+
+class Search:
+    """Forward selection on one recording."""
+
+    def __init__(
+        self, start: JointFit, views: Views, kinematics: ArmKinematics | None = None
+    ) -> None:
+        self.views, self.kinematics = views, kinematics
+        self.best = Trial(start, criterion(start, views))
+        self.steps: list[Step] = []
+
+    def run(self) -> JointFit:
+        """Take effects in until none is demanded; then drop those that are not missed."""
+        while len(self.steps) < _MOST_EFFECTS and self._take():
+            pass
+        while self._drop():
+            pass
+        return self.best.fit
+
+    def ranked(self, fit: JointFit) -> list[tuple[Candidate, Score]]:
+        """Score every candidate, the best shape of each effect only, best first."""
+        coarse = list(candidates(fit.model, self.views))
+        best = self._best_shapes(fit, coarse)
+        fine = [shape for candidate, _ in best for shape in finer(candidate, self.views)]
+        ranked = self._best_shapes(fit, fine)
+        return sorted(ranked, key=lambda pair: -self._promise(*pair))
+
+    def _best_shapes(
+        self, fit: JointFit, tried: Sequence[Candidate]
+    ) -> list[tuple[Candidate, Score]]:
+        scores = score_effects(fit, self.views, [c.present for c in tried], self.kinematics)
+        best: dict[str, tuple[Candidate, Score]] = {}
+        for candidate, score in zip(tried, scores, strict=True):
+            label = candidate.effect.label
+            if label not in best or self._promise(candidate, score) > self._promise(*best[label]):
+                best[label] = (candidate, score)
+        return list(best.values())
+
+    def _promise(self, candidate: Candidate, score: Score) -> float:
+        return bic(score.gain, score.columns, self.views) - 2.0 * float(np.log(candidate.choices))
+
+    def earnest(self, fit: JointFit, picked: Sequence[Candidate]) -> list[tuple[Candidate, Trial]]:
+        """Fit each candidate next to what the model has."""
+        trials = []
+        for candidate in picked:
+            tried = fit_with(
+                fit, self.views, (*fit.model.effects, candidate.present), self.kinematics
+            )
+            trials.append(
+                (candidate, Trial(tried, criterion(tried, self.views, candidate.choices)))
+            )
+        return sorted(trials, key=lambda pair: pair[1].criterion)
+
+    def _take(self) -> bool:
+        fit = self.best.fit
+        promising = [c for c, s in self.ranked(fit) if self._promise(c, s) > 0.0]
+        trials = self.earnest(fit, promising[:_FITTED_IN_EARNEST])
+        if not trials:
+            return False
+        candidate, trial = trials[0]
+        demand = self.best.criterion - trial.criterion
+        if demand < DEMAND:
+            return False
+        rivals = tuple((c.present, t.criterion - trial.criterion) for c, t in trials[1:])
+        self.steps.append(Step(candidate.present, trial, demand, rivals))
+        self.best = trial
+        return True
+
+    def _drop(self) -> bool:
+        """Drop the effect that the others have made needless, if there is one."""
+        fit = self.best.fit
+        effects = fit.model.effects
+        if len(effects) < 2:
+            return False
+        for index in range(len(effects)):
+            rest = effects[:index] + effects[index + 1 :]
+            tried = fit_with(fit, self.views, rest, self.kinematics)
+            value = criterion(tried, self.views)
+            if value < self.best.criterion + DEMAND:
+                self.best = Trial(tried, value)
+                return True
+        return False
+
+
+def blank_effects(model: CellModel) -> CellModel:
+    """The same cell with every effect's amounts at zero."""
+    return replace(
+        model,
+        effects=tuple(
+            Present(
+                p.effect,
+                np.where([q.role == "amount" for q in p.effect.parameters], 0.0, p.values),
+            )
+            for p in model.effects
+        ),
+    )
