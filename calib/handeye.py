@@ -4,7 +4,8 @@ One closed chain per frame, camera_from_board = flange_from_mounted^-1 base_from
 base_from_fixed (camera on the flange) or its mirror image (board on the flange). Rotations start
 from Shah's closed form (M. Shah, "Solving the robot-world/hand-eye calibration problem using the
 Kronecker product", J. Mechanisms Robotics 5, 2013), which has no order of samples to depend on;
-then everything is refined together, each kind of residual weighted by its own scatter.
+then everything is refined together; lateral, depth and angular residuals are each weighted by
+their own scatter, so that a wrong focal length, which moves boards along the axis, weighs little.
 """
 
 from __future__ import annotations
@@ -20,8 +21,12 @@ from calib.errors import CalibrationError
 from calib.paper.extrinsics import nearest_rotation
 from calib.views import BoolArray, FloatArray, Mount
 
-OUTLIER_SIGMA = 6.0
+OUTLIER_SIGMA = 10.0
+"""Wrong pairs are off by far more; frames are few and their scatter has long tails."""
+
 MIN_FRAMES = 4
+_UNIT_RANGE = (0.7, 1.4)
+_LATERAL, _DEPTH, _ANGLES = slice(0, 2), slice(2, 3), slice(3, 6)
 _MIN_ROTATION_RAD = np.radians(3.0)
 _FINEST = 1e-6  # metres or radians: below it numeric derivatives lose their digits
 
@@ -109,8 +114,8 @@ def solve_hand_eye(
     Raises
     ------
     CalibrationError
-        Fewer than four frames, or motions that do not fix the transforms (pure translation,
-        rotation about one axis only).
+        Fewer than four frames, motions that do not fix the transforms (pure translation,
+        rotation about one axis only), or positions in another unit of length than the board's.
     """
     both = np.isfinite(camera_from_board) & np.isfinite(base_from_flange)
     known: BoolArray = np.asarray(both.all(axis=(1, 2)))
@@ -121,6 +126,7 @@ def solve_hand_eye(
     _check_motion(base_from_flange[known])
     problem = _Problem(mount, camera_from_board, base_from_flange, board_centre_m)
     X, Z = _closed_form_robust(problem, known)
+    _check_length_unit(problem, known, X)
     used = known.copy()
     for _ in range(5):
         X, Z, covariance, distance = _refine(problem, X, Z, used)
@@ -152,9 +158,9 @@ class _Problem:
         return out
 
     def scales(self, residual: FloatArray) -> FloatArray:
-        """(6,) robust scatter: one for the positions, one for the angles."""
+        """(6,) robust scatter: of the lateral position, of the depth, and of the angles."""
         scale = np.empty(6)
-        for group in (slice(0, 3), slice(3, 6)):
+        for group in (_LATERAL, _DEPTH, _ANGLES):
             scale[group] = max(np.median(np.abs(residual[:, group])) / 0.6745, _FINEST)
         return scale
 
@@ -175,11 +181,30 @@ def _check_motion(base_from_flange: FloatArray) -> None:
         )
 
 
+def _check_length_unit(problem: _Problem, known: BoolArray, X: FloatArray) -> None:
+    """Solve the translations with the robot's unit of length free: it should come out as one."""
+    C = problem.camera_from_board[known]
+    C = C if problem.mount == "eye_in_hand" else inverse(C)
+    F = problem.base_from_flange[known]
+    back = np.swapaxes(F[:, :3, :3], 1, 2)
+    moved = back @ F[:, :3, 3, None]
+    left = np.concatenate([np.tile(np.eye(3), (len(F), 1, 1)), -back, moved], axis=2)
+    right = -(C[:, :3, 3] @ X[:3, :3].T)
+    unit = float(np.linalg.lstsq(left.reshape(-1, 7), right.ravel(), rcond=None)[0][6])
+    if not _UNIT_RANGE[0] < unit < _UNIT_RANGE[1]:
+        raise CalibrationError(
+            f"the logged positions and the board's squares disagree about length by a factor of"
+            f" {1 / unit if unit else np.inf:.4g}: check base_from_flange.p_m (metres) and square_m"
+        )
+
+
 def _closed_form_robust(problem: _Problem, known: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Closed form, repeated on the better half until a few wrong pairs no longer matter."""
     used = known.copy()
     for _ in range(4):
-        X, Z = _closed_form(problem, used)
+        X, Z = closed_form(
+            problem.camera_from_board[used], problem.base_from_flange[used], problem.mount
+        )
         size = np.linalg.norm(problem.residuals(X, Z)[:, 3:], axis=1)
         again = known & (size <= 4 * max(float(np.median(size[known])), 1e-9))
         if (again == used).all() or again.sum() < MIN_FRAMES:
@@ -188,10 +213,18 @@ def _closed_form_robust(problem: _Problem, known: BoolArray) -> tuple[FloatArray
     return X, Z
 
 
-def _closed_form(problem: _Problem, used: BoolArray) -> tuple[FloatArray, FloatArray]:
-    C = problem.camera_from_board[used]
-    C = C if problem.mount == "eye_in_hand" else inverse(C)
-    F = problem.base_from_flange[used]
+def closed_form(
+    camera_from_board: FloatArray, base_from_flange: FloatArray, mount: Mount
+) -> tuple[FloatArray, FloatArray]:
+    """(4, 4) flange_from_mounted and base_from_fixed after Shah, from three frames and more.
+
+    Parameters
+    ----------
+    camera_from_board, base_from_flange:
+        (N, 4, 4), all known and right: one wrong pair spoils it.
+    """
+    C = camera_from_board if mount == "eye_in_hand" else inverse(camera_from_board)
+    F = base_from_flange
     back = np.swapaxes(F[:, :3, :3], 1, 2)
     K = np.einsum("nij,nkl->ikjl", back, C[:, :3, :3]).reshape(9, 9)
     u, _, vt = np.linalg.svd(K)
@@ -229,5 +262,7 @@ def _refine(
         jacobian = np.asarray(fit.jac, dtype=np.float64)
         covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True) * variance
     standard = problem.residuals(X, Z) / problem.scales(problem.residuals(X, Z)[used])
-    distance = np.nan_to_num(np.abs(standard).max(axis=1), nan=np.inf)
+    # A lens that moves its focus shifts good frames along the axis, and only there.
+    telling = np.abs(np.delete(standard, _DEPTH, axis=1))
+    distance = np.nan_to_num(telling.max(axis=1), nan=np.inf)
     return X, Z, covariance, distance

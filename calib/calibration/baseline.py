@@ -20,7 +20,8 @@ FRAME_OUTLIER = 6.0
 """A frame this many times worse than the median one is a wrong detection."""
 
 CORNER_OUTLIER = 8.0
-_FRAME_FLOOR_PX = 0.5
+_SQUARE_SHARE = 0.03
+"""A wrong detection is off by a good share of a square; a lens that moves its focus is not."""
 
 
 @dataclass(frozen=True)
@@ -165,15 +166,22 @@ def _bad_frames(residual_px: FloatArray, views: Views, used: BoolArray) -> list[
     distance = np.linalg.norm(residual_px, axis=2)
     typical = np.full(len(views), np.nan)
     typical[used] = np.nanmedian(distance[used], axis=1)
-    limit = FRAME_OUTLIER * max(float(np.nanmedian(typical)), _FRAME_FLOOR_PX / FRAME_OUTLIER)
-    return [
-        Rejection(
-            int(views.frame[i]),
-            f"its corners miss the board by {typical[i]:.1f} px, {limit:.1f} px is the limit:"
-            " a wrong detection",
-        )
-        for i in np.flatnonzero(np.nan_to_num(typical) > limit)
-    ]
+    usual = FRAME_OUTLIER * float(np.nanmedian(typical))
+    found = []
+    for i in np.flatnonzero(used):
+        limit = max(usual, _SQUARE_SHARE * _square_px(views, int(i)))
+        if typical[i] > limit:
+            reason = f"its corners miss the board by {typical[i]:.1f} px: a wrong detection"
+            found.append(Rejection(int(views.frame[i]), reason))
+    return found
+
+
+def _square_px(views: Views, frame: int) -> float:
+    """Typical side of a square in one frame, from the area its corners cover."""
+    seen = views.seen[frame]
+    spread_px = np.linalg.det(np.cov(views.corners_px[frame, seen].T))
+    spread_m = np.linalg.det(np.cov(views.board.corners_m[seen, :2].T))
+    return float(views.board.square_m * max(spread_px / max(spread_m, 1e-12), 0.0) ** 0.25)
 
 
 def _corner_weight(residual_px: FloatArray, views: Views, used: BoolArray) -> FloatArray:

@@ -20,7 +20,12 @@ from calib.views import BoolArray, FloatArray, Views
 PARALLEL_RAD = np.radians(6.0)
 """Views tilted less than this give scale factors; their tilt is accounted for all the same."""
 
-_ROUNDS = 3
+TILTED_RAD = np.radians(45.0)
+"""Where fewer than `ENOUGH` views are parallel, views up to this tilt are taken as well."""
+
+ENOUGH = 8
+
+_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -78,19 +83,13 @@ def run_paper_method(
     robot_poses = reference.camera_from_board(views.base_from_flange)
     distance = board_depth_m(views, robot_poses)
     part = used & views.has_pose & ~np.isin(views.frame, reference.outliers)
-    tilt = np.arccos(np.clip(np.nan_to_num(robot_poses[:, 2, 2]), -1, 1))
-    parallel: BoolArray = np.asarray(part & (tilt < PARALLEL_RAD))
-    if not parallel.any():
-        reason = f"no view is parallel to the board within {np.degrees(PARALLEL_RAD):.0f} degrees"
-        missing = dict.fromkeys(("scale_factors", "zones", "focus_law"), reason)
-        missing |= dict.fromkeys(("fixed_alpha_algebraic", "fixed_alpha_mle"), reason)
-        return PaperResult((), None, None, None, {}, missing)
-    common = common_distance_sigma_m(views, reference, parallel)
+    chosen, note = _views_for_scale(part, robot_poses)
+    common = common_distance_sigma_m(views, reference, chosen)
     model = start
     principal = ((views.width_px - 1) / 2, (views.height_px - 1) / 2)
     for _ in range(_ROUNDS):
         factors = _scale_factors(
-            views, parallel, weight, model, distance, principal, reference.flange_sigma_m
+            views, chosen, weight, model, distance, principal, reference.flange_sigma_m
         )
         alpha, beta = _held(factors, distance, common)
         solutions = _fixed_alpha(views, part, weight, homographies, distance, alpha.law, beta)
@@ -98,6 +97,8 @@ def run_paper_method(
         principal = (model.values["u0_px"], model.values["v0_px"])
     zones, why = find_zones(*_columns(factors), alpha.choice)
     missing = {} if zones is not None else {"zones": why}
+    if note:
+        missing["parallel_views"] = note
     if alpha.choice is None:
         missing["focus_law"] = f"{len(factors)} near-parallel views; a law needs 5"
     told = {
@@ -107,16 +108,35 @@ def run_paper_method(
     return PaperResult(factors, alpha.choice, beta, zones, told, missing)
 
 
+def _views_for_scale(part: BoolArray, robot_poses: FloatArray) -> tuple[BoolArray, str]:
+    """Which views give scale factors, and a note where they are not the parallel ones."""
+    tilt = np.arccos(np.clip(np.nan_to_num(robot_poses[:, 2, 2]), -1, 1))
+    parallel: BoolArray = np.asarray(part & (tilt < PARALLEL_RAD))
+    count = int(parallel.sum())
+    if count >= ENOUGH:
+        return parallel, ""
+    tilted: BoolArray = np.asarray(part & (tilt < TILTED_RAD))
+    if not tilted.any():
+        raise CalibrationError(
+            f"no view is tilted less than {np.degrees(TILTED_RAD):.0f} degrees against the board"
+        )
+    return tilted, (
+        f"{count} views are parallel to the board within {np.degrees(PARALLEL_RAD):.0f} degrees;"
+        f" scale factors come from all {int(tilted.sum())} tilted less than"
+        f" {np.degrees(TILTED_RAD):.0f}, their tilt accounted for"
+    )
+
+
 def _scale_factors(
     views: Views,
-    parallel: BoolArray,
+    chosen: BoolArray,
     weight: FloatArray,
     model: Solution,
     distance: FloatArray,
     principal: tuple[float, float],
     flange_sigma_m: float,
 ) -> tuple[ScaleFactor, ...]:
-    rows = np.flatnonzero(parallel & np.isfinite(model.optics[:, 0]))
+    rows = np.flatnonzero(chosen & np.isfinite(model.optics[:, 0]))
     ideal = without_distortion(
         np.where(weight[..., None] > 0, views.corners_px, np.nan)[rows],
         model.optics[rows],

@@ -13,16 +13,20 @@ import numpy as np
 
 from calib.calibration.result import RobotReference
 from calib.chain.effects import make_effect
-from calib.chain.model import CellModel
+from calib.chain.model import CellModel, walk
 from calib.chain.optics import COLUMN
 from calib.errors import CalibrationError
 from calib.handeye import HandEye, solve_hand_eye
+from calib.solver.free_poses import fit_free_poses
 from calib.solver.joint import JointFit, fit_joint
 from calib.solver.noise import Noise
 from calib.solver.unknowns import PLAIN_OPTICS, unknowns_of
 from calib.views import BoolArray, FloatArray, Views
 
-DECISIVE_AIC = 6.0
+DECISIVE_AIC = 30.0
+"""Far above chance: an arm with errors of its own bends the joint fit by some tens."""
+
+_ALPHA_RANGE = 1.3
 _FOCUS_LAWS = ("inverse_square", "thin_lens")
 _POSE = tuple(
     f"{frame}.{axis}"
@@ -76,7 +80,9 @@ def fit_robot(
     plain = CellModel(_without_skew(optics), hand.flange_from_mounted, hand.base_from_fixed)
     try:
         law, joint, gain = _best_lens(plain, chosen, noise)
-    except (np.linalg.LinAlgError, FloatingPointError):
+    except np.linalg.LinAlgError:
+        return RobotFit(_from_hand_eye(hand, sigma_px, outliers), None, taken)
+    if not _plausible(joint, plain):
         return RobotFit(_from_hand_eye(hand, sigma_px, outliers), None, taken)
     places = [[u.name for u in joint.unknowns].index(name) for name in _POSE]
     reference = RobotReference(
@@ -107,6 +113,13 @@ def hand_eye_of(views: Views, used: BoolArray, camera_from_board: FloatArray) ->
     return solve_hand_eye(poses, views.base_from_flange, views.mount, centre)
 
 
+def _plausible(joint: JointFit, plain: CellModel) -> bool:
+    """Whether the joint fit stayed near the pictures' own answer, whatever the robot said."""
+    alpha = COLUMN["alpha_px"]
+    ratio = joint.model.optics[alpha] / plain.optics[alpha]
+    return bool(np.isfinite(joint.covariance).all() and 1 / _ALPHA_RANGE < ratio < _ALPHA_RANGE)
+
+
 def _without_skew(optics: FloatArray) -> FloatArray:
     row = optics.copy()
     row[COLUMN["skew_px"]] = 0.0
@@ -114,14 +127,19 @@ def _without_skew(optics: FloatArray) -> FloatArray:
 
 
 def _best_lens(plain: CellModel, views: Views, noise: Noise) -> tuple[str | None, JointFit, float]:
-    """The joint fit with the lens law the data prefer, and its gain in AIC over none."""
+    """The joint fit with the lens law the data prefer, and its gain in AIC over none.
+
+    A law must not make the pictures fit worse: an arm that is off bends the joint fit, too, and
+    the pictures know nothing of the arm.
+    """
     still = _fit(plain, views, noise)
     start = still.model
+    still_rms = _image_rms_px(still, views) * (1 + 1e-6)
     best: tuple[str | None, JointFit] = (None, still)
     for law in _FOCUS_LAWS:
         effect = make_effect("focus_breathing", {"law": law})
         moving = _fit(start.with_effects([effect]), views, still.noise)
-        if _aic(moving) < _aic(best[1]):
+        if _aic(moving) < _aic(best[1]) and _image_rms_px(moving, views) <= still_rms:
             best = (law, moving)
     gain = _aic(still) - _aic(best[1])
     return (*best, gain) if gain >= DECISIVE_AIC else (None, still, gain)
@@ -129,6 +147,21 @@ def _best_lens(plain: CellModel, views: Views, noise: Noise) -> tuple[str | None
 
 def _fit(model: CellModel, views: Views, noise: Noise) -> JointFit:
     return fit_joint(model, views, unknowns_of(model, PLAIN_OPTICS), noise)
+
+
+def _image_rms_px(fit: JointFit, views: Views) -> float:
+    """Residuals of a fit's camera with poses from the pictures alone."""
+    state, weight = walk(fit.model, views, flange_error=fit.flange_error), fit.weight
+    free = fit_free_poses(
+        state.optics,
+        state.camera_from_board,
+        state.points_m,
+        views.corners_px,
+        (),
+        weight=weight,
+    )
+    weighted = np.nansum(free.residual_px**2, axis=2) * weight
+    return float(np.sqrt(weighted.sum() / weight.sum()))
 
 
 def _aic(fit: JointFit) -> float:

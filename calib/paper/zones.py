@@ -97,7 +97,7 @@ def find_zones(
     far_m, far_is_bound = _far_limit(d, near.residual, s / a)
     inside = (d >= near.limit_m) & (d <= far_m)
     if not inside.any():
-        return None, f"no view lies between {near.limit_m:.2f} m and {far_m:.2f} m"
+        return None, f"every view's own error exceeds {TOLERANCE:.1%}: all lie in zone 3"
     alpha, alpha_sigma = _mean(a[inside], s[inside])
     beta, beta_sigma = _mean(beta_px[order][inside], beta_sigma_px[order][inside])
     zones = Zones(

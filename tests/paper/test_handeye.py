@@ -79,3 +79,11 @@ def test_position_error_is_positive_in_z_when_the_camera_is_computed_too_close()
     closer = compose(np.zeros((len(true), 3)), np.tile([0.0, 0.0, -0.1], (len(true), 1))) @ true
     error = camera_position_error_m(closer, true)
     assert np.allclose(error, [0.0, 0.0, 0.1])
+
+
+def test_a_log_in_millimetres_is_told() -> None:
+    true = mixed_scene()
+    flange = true.views.base_from_flange.copy()
+    flange[:, :3, 3] *= 1000
+    with pytest.raises(CalibrationError, match="factor of 1000"):
+        solve_hand_eye(true.camera_from_board, flange, "eye_in_hand", CENTRE)

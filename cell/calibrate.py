@@ -1,0 +1,149 @@
+"""`cell calibrate`: from a recording to `calibration.json` and the arrays a report needs."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from calib.calibration import Calibration, calibrate
+from calib.calibration.mapping import as_mapping
+from calib.detection import Detection, detect
+from calib.errors import CalibrationError
+from calib.orientation import same_order_everywhere
+from calib.views import Views
+from cell.errors import BadAnswer, InputError
+from cell.files.calibration_file import CalibrationFile
+from cell.recording import Corners, FrameRecord, Recording, write_corners
+
+FILE_NAME = "calibration.json"
+log = logging.getLogger(__name__)
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What `calibrate_recording` found.
+
+    Attributes
+    ----------
+    views:
+        All frames of the recording.
+    result:
+        The calibration.
+    mapping:
+        The content of `calibration.json`.
+    """
+
+    views: Views
+    result: Calibration
+    mapping: dict[str, Any]
+
+
+def detect_corners(recording: Recording, progress: Progress | None = None) -> Corners:
+    """Find the board in every picture of a recording.
+
+    A frame whose picture is missing, broken or shows no usable board is rejected with the
+    reason; it never stops the others.
+    """
+    found: dict[int, Detection] = {}
+    rejected: dict[int, str] = {}
+    for at, frame in enumerate(recording.frames):
+        detection = _detect(recording, frame)
+        if isinstance(detection, Detection):
+            found[frame.frame] = detection
+        else:
+            rejected[frame.frame] = detection
+            log.info("frame %d: %s", frame.frame, detection)
+        if progress is not None:
+            progress(at + 1, len(recording.frames))
+    return Corners(
+        px={number: d.corners_px for number, d in found.items()},
+        sigma_px={number: d.sigma_px for number, d in found.items()},
+        blur_px={number: d.frame_blur_px for number, d in found.items()},
+        rejected=rejected,
+    )
+
+
+def _detect(recording: Recording, frame: FrameRecord) -> Detection | str:
+    try:
+        result = detect(recording.image(frame), recording.board)
+    except InputError as error:
+        return str(error)
+    return result if isinstance(result, Detection) else result.reason
+
+
+def corners_of(recording: Recording, progress: Progress | None = None) -> Corners:
+    """The corners that came with a recording, or those its pictures show."""
+    if recording.has_detections:
+        return recording.detections()
+    return detect_corners(recording, progress)
+
+
+def calibrate_recording(
+    recording: Recording, corners: Corners | None = None, progress: Progress | None = None
+) -> Calibrated:
+    """Calibrate a recording in every way it allows.
+
+    Raises
+    ------
+    BadAnswer
+        No calibration is possible; the message says why and how to mend it.
+    InputError
+        The recording's files are broken.
+    """
+    corners = corners_of(recording, progress) if corners is None else corners
+    views = same_order_everywhere(recording.views(corners))
+    try:
+        result = calibrate(views)
+    except CalibrationError as error:
+        raise BadAnswer(f"{recording.path}: {error}{_first_reasons(corners)}") from None
+    mapping = as_mapping(result, recording.name)
+    for rejection in mapping["frames_rejected"]:
+        rejection["reason"] = corners.rejected.get(rejection["frame"], rejection["reason"])
+    checked = CalibrationFile.model_validate(mapping)
+    return Calibrated(views, result, checked.model_dump(mode="json", by_alias=True))
+
+
+def _first_reasons(corners: Corners) -> str:
+    """The three first rejected frames with their reasons, to put behind an error."""
+    told = [f"\n  frame {frame}: {why}" for frame, why in list(corners.rejected.items())[:3]]
+    more = len(corners.rejected) - len(told)
+    return "".join(told) + (f"\n  and {more} frames more" if more > 0 else "")
+
+
+def default_folder(recording: Recording) -> Path:
+    """Where results go without `-o`: a folder in the recording, or here where that is read-only."""
+    if os.access(recording.path, os.W_OK):
+        return recording.path / "calibration"
+    return Path.cwd() / f"{recording.name}-calibration"
+
+
+def write_calibration(calibrated: Calibrated, folder: Path, corners: Corners | None = None) -> Path:
+    """Write `calibration.json`, and `detections.csv` of corners that were found anew.
+
+    Results may be made again, so older ones of the same name are replaced, each whole.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / FILE_NAME
+        partial = path.with_name(path.name + ".part")
+        partial.write_text(json.dumps(calibrated.mapping, indent=1) + "\n", encoding="utf-8")
+        partial.replace(path)
+        if corners is not None:
+            write_corners(folder / "detections.csv", corners, calibrated.views.board)
+    except OSError as fault:
+        raise InputError(
+            f"{folder}: cannot be written: {fault.strerror}; give another -o"
+        ) from None
+    return path
