@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TypeGuard
+from collections.abc import Mapping
+from typing import Any, TypeGuard
 
 UNKNOWN = "not known"
 
@@ -62,13 +63,15 @@ def number(value: float | None, unit: str = "", digits: int = 3) -> str:
     return _join(_fixed(value, _decimals(value, digits)), unit)
 
 
-def measured(value: float | None, sigma: float | None, unit: str = "") -> str:
-    """Value ± one sigma, both to two digits of sigma; says so where sigma is unknown."""
+def measured(
+    value: float | None, sigma: float | None, unit: str = "", without: str = " (± not known)"
+) -> str:
+    """Value ± one sigma, both to two digits of sigma; `without` follows where sigma is unknown."""
     if not known(value):
         return UNKNOWN
     value, sigma, unit = _readable(value, sigma, unit)
     if not known(sigma) or sigma <= 0:
-        return f"{number(value, unit, 5)} (± not known)"
+        return f"{number(value, unit, 5)}{without}"
     return _join(plus_minus(value, sigma), unit)
 
 
@@ -80,6 +83,14 @@ def plus_minus(value: float | None, sigma: float | None) -> str:
         return _scientific(value, sigma)
     decimals = _decimals(sigma, 2)
     return f"{_fixed(value, decimals)} ± {_fixed(sigma, decimals)}"
+
+
+def parameters(found: Mapping[str, Mapping[str, Any]]) -> str:
+    """Named values with their uncertainties, in one line."""
+    return "; ".join(
+        f"{symbol(name)} = {measured(entry['value'], entry.get('sigma'), entry.get('unit', ''))}"
+        for name, entry in found.items()
+    )
 
 
 def probability(p: float | None) -> str:

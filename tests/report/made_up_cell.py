@@ -110,19 +110,43 @@ def calibration(made: MadeUp, poses: dict[str, SolutionPoses]) -> dict[str, Any]
         ],
         "scale_factors": [
             {"frame": int(f), "distance_m": float(d), "alpha_px": float(a),
-             "alpha_sigma_px": 0.8 * float(d), "beta_px": float(a + 2.9), "beta_sigma_px": 0.9}
+             "alpha_sigma_px": 0.8 * float(d), "beta_px": float(a + 2.9), "beta_sigma_px": 0.9,
+             "tilt_rad": 0.002}
             for f, d, a in zip(parallel, distance, alpha, strict=True)
         ],
-        "zones": {"near_limit_m": 0.42, "far_limit_m": 1.0, "alpha_px": 1370.8, "beta_px": 1373.8},
-        "focus_law": {
-            "law": "inverse_square",
-            "parameters": {
-                "alpha0_px": {"value": ALPHA_PX + 0.11, "sigma": 0.21, "unit": "px"},
-                "k_px_m2": {"value": K_PX_M2 - 0.02, "sigma": 0.05, "unit": "px m^2"},
-            },
+        "zones": {
+            "near_limit_m": 0.42, "near_sigma_m": 0.03, "far_limit_m": 1.0, "near_is_bound": False,
+            "far_is_bound": True, "alpha_px": 1370.8, "alpha_sigma_px": 0.4, "beta_px": 1373.8,
+            "beta_sigma_px": 0.4, "method": "change_point", "why": "beyond it nothing moves",
         },
+        "zones_reason": None,
+        "focus_law": focus_law(),
+        "robot": {
+            "mount": "eye_in_hand", "source": "joint", "focus_law": "focus_breathing:thin_lens",
+            "focus_law_gain_aic": 312.0, "flange_sigma_m": 4.1e-5, "flange_sigma_rad": 6e-5,
+            "corner_sigma_px": 0.11, "outliers": [5],
+        },
+        "missing": {},
+        "flange_from_board": None, "base_from_camera": None,
         "solutions": {name: _solution(name, p) for name, p in poses.items()},
         "flange_from_camera": _pose(), "base_from_board": _pose(),
+    }  # fmt: skip
+
+
+def focus_law() -> dict[str, Any]:
+    parameters = {
+        "alpha0_px": {"value": ALPHA_PX + 0.11, "sigma": 0.21, "unit": "px"},
+        "k_px_m2": {"value": K_PX_M2 - 0.02, "sigma": 0.05, "unit": "px m^2"},
+    }
+    constant = {"alpha_px": {"value": 1352.0, "sigma": 9.0, "unit": "px"}}
+    return {
+        "law": "inverse_square", "parameters": parameters, "beta_parameters": parameters,
+        "why": "inverse_square beats constant by 61.2 AICc", "decisive": True,
+        "candidates": [
+            {"law": "constant", "aicc": 70.4, "bic": 71.0, "scatter": 31.0, "parameters": constant},
+            {"law": "inverse_square", "aicc": 9.2, "bic": 9.9, "scatter": 1.02,
+             "parameters": parameters},
+        ],
     }  # fmt: skip
 
 
@@ -134,20 +158,22 @@ def _solution(name: str, poses: SolutionPoses) -> dict[str, Any]:
     return {
         "alpha_px": 1319.7 if zhang else 1370.83, "beta_px": 1329.7 if zhang else 1373.81,
         "u0_px": 711.2 if zhang else 645.82, "v0_px": 375.9 if zhang else 359.31,
-        "skew_px": 8e-4, "k1": 0.0087, "k2": -0.072,
+        "at_distance_m": None if zhang else 0.64, "skew_px": 8e-4, "k1": 0.0087, "k2": -0.072,
         "sigma": {"alpha_px": 0.22, "beta_px": 0.23, "u0_px": 0.31, "v0_px": 0.27, "k1": 1.2e-4},
         "reprojection_px": {"mean": 1.8e-10, "median": 0.05, "std": 0.231, "rms": 0.231},
         "camera_position_error_m": {
             "mean": error.mean(axis=0).tolist(), "std": error.std(axis=0).tolist(),
             "rms": float(np.sqrt((error**2).sum(axis=1).mean())),
+            "own_hand_eye": None, "robot_in_it": not zhang,
         },
+        "robot_consistency": {"rms_m": 1.3e-4, "rms_rad": 2e-4},
     }  # fmt: skip
 
 
 def _pose() -> dict[str, Any]:
     return {
         "p_m": [0.0123, -0.0541, 0.0873], "q_xyzw": [0.0, 0.7071, 0.0, 0.7071],
-        "sigma_p_m": [1.1e-5, 1.2e-5, 2.1e-5], "sigma_r_rad": 8e-5,
+        "sigma_p_m": [1.1e-5, 1.2e-5, 2.1e-5], "sigma_r_rad": [8e-5, 7e-5, 6e-5],
     }  # fmt: skip
 
 

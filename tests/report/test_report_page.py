@@ -11,6 +11,7 @@ import made_up_cell
 import pytest
 
 from calib.views import Views
+from cell.files.calibration_file import CalibrationFile
 from cell.report import ReportData, write_report
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
@@ -62,6 +63,10 @@ def parsed(data: ReportData, folder: Path) -> tuple[Strict, str]:
 @pytest.fixture(scope="module")
 def full_page(tmp_path_factory: pytest.TempPathFactory) -> tuple[Strict, str]:
     return parsed(made_up_cell.full(), tmp_path_factory.mktemp("full"))
+
+
+def test_the_made_up_calibration_has_the_shape_of_the_real_file() -> None:
+    CalibrationFile.model_validate(made_up_cell.full(9).calibration)
 
 
 def test_it_loads_nothing_from_outside(full_page: tuple[Strict, str]) -> None:

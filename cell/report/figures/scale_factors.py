@@ -89,18 +89,15 @@ def _zone_name(ax: Axes, x: float, words: str) -> None:
 
 def _law(ax: Axes, data: ReportData, letter: str, distance: FloatArray) -> None:
     law = (data.calibration or {}).get("focus_law")
+    if law and letter == "beta":
+        law = {**law, "parameters": law.get("beta_parameters")}
+    if not law or not law["parameters"]:
+        return
     grid = np.linspace(np.nanmin(distance), np.nanmax(distance), 120)
     curve = law_px(law, grid)
-    if law and curve is not None:
-        ratio = _beta_over_alpha(data) if letter == "beta" else 1.0
+    if curve is not None:
         words = str(law["law"]).replace("_", " ")
-        ax.plot(grid, curve * ratio, color=GREEN, linestyle="-.", label=f"fitted law: {words}")
-
-
-def _beta_over_alpha(data: ReportData) -> float:
-    best = data.solutions.get(data.recommended or "", {})
-    alpha, beta = best.get("alpha_px"), best.get("beta_px")
-    return float(beta / alpha) if alpha and beta else 1.0
+        ax.plot(grid, curve, color=GREEN, linestyle="-.", label=f"fitted law: {words}")
 
 
 def _moving(ax: Axes, data: ReportData, letter: str) -> None:

@@ -8,8 +8,15 @@ from typing import Any
 from cell.report import html
 from cell.report.data import ReportData
 from cell.report.figures import scale_factors
-from cell.report.numbers import measured, number, symbol
+from cell.report.numbers import UNKNOWN, known, measured, number, parameters
 from cell.report.sections.drawing import drawing
+
+_FORMULAS = {
+    "inverse_square": "α = α₀ − k/d²",
+    "thin_lens": "α = α∞ · d/(d − f)",
+    "constant": "α does not change with distance",
+    "free": "a smooth curve through nodes",
+}
 
 
 def lens(data: ReportData) -> str:
@@ -33,34 +40,50 @@ def lens(data: ReportData) -> str:
 
 
 def _zones(data: ReportData, zones: Mapping[str, Any] | None) -> str:
-    if not zones or "near_limit_m" not in zones:
-        reason = (zones or {}).get("reason") or data.why_missing("zones")
+    if not zones:
+        reason = (data.calibration or {}).get("zones_reason") or data.why_missing("zones")
         return f"Zones were not found: {reason}."
+    near = measured(zones["near_limit_m"], zones.get("near_sigma_m"), "m", without="")
+    near = f"at most {near}" if zones.get("near_is_bound") else near
+    far = number(zones["far_limit_m"], "m")
+    far = f"at least {far}" if zones.get("far_is_bound") else far
+    alpha = measured(zones["alpha_px"], zones.get("alpha_sigma_px"), "px")
+    beta = measured(zones["beta_px"], zones.get("beta_sigma_px"), "px")
     return (
-        f"One scale factor holds (zone 2) from {number(zones.get('near_limit_m'), 'm')} to "
-        f"{number(zones.get('far_limit_m'), 'm')}: α = {number(zones.get('alpha_px'), 'px', 6)}, "
-        f"β = {number(zones.get('beta_px'), 'px', 6)}. Nearer, it follows the focus (zone 1); "
-        "farther, the board is too small in the picture to tell (zone 3)."
+        f"One scale factor holds (zone 2) from {near} to {far}: α = {alpha}, β = {beta}. Nearer, "
+        "it follows the focus (zone 1); farther, the board is too small in the picture to tell "
+        f"(zone 3). {zones.get('why') or ''}"
     )
 
 
 def _law(data: ReportData, law: Mapping[str, Any] | None) -> str:
-    if not law or "law" not in law:
-        reason = (law or {}).get("reason") or data.why_missing("focus_law")
+    if not law:
+        reason = data.why_missing("focus_law")
         return html.missing(f"No focus law was fitted to scale factors: {reason}.")
+    name = str(law["law"])
+    prefer = "decisively" if law.get("decisive") else "but not decisively"
+    title = (
+        f"Focus law the data prefer, {prefer}: {_words(name)}, {_FORMULAS.get(name, '')}. "
+        f"{law.get('why') or ''}"
+    )
+    candidates = law.get("candidates") or [law]
+    best = min((c["aicc"] for c in candidates if known(c.get("aicc"))), default=None)
     rows = [
-        (symbol(name), measured(entry["value"], entry.get("sigma"), entry.get("unit", "")))
-        for name, entry in (law.get("parameters") or {}).items()
-    ]
-    formula = {
-        "inverse_square": "α = α₀ − k/d²",
-        "thin_lens": "α = α∞ · d/(d − f)",
-        "constant": "α does not change with distance",
-        "free": "a smooth curve through nodes",
-    }.get(str(law.get("law")), "")
-    why = f" {law['why']}." if law.get("why") else ""
-    title = f"Focus law the data prefer: {str(law.get('law')).replace('_', ' ')}, {formula}.{why}"
-    return html.paragraph(title) + html.table(("parameter", "value"), rows)
+        (_words(c["law"]), parameters(c.get("parameters") or {}), _difference(c, best),
+         number(c.get("scatter"), "", 2))
+        for c in candidates
+    ]  # fmt: skip
+    head = ("law", "parameters of α", "AICc above the best", "scatter over σ")
+    return html.paragraph(title) + html.table(head, rows)
+
+
+def _difference(law: Mapping[str, Any], best: float | None) -> str:
+    aicc = law.get("aicc")
+    return UNKNOWN if best is None or not known(aicc) else f"{aicc - best:.1f}"
+
+
+def _words(name: object) -> str:
+    return str(name).replace("_", " ")
 
 
 def _factors(factors: list[Mapping[str, Any]]) -> str:

@@ -9,7 +9,14 @@ from typing import Any
 from cell.report import html
 from cell.report.data import ReportData
 from cell.report.figures import camera_positions, position_errors
-from cell.report.numbers import measured
+from cell.report.numbers import (
+    UNKNOWN,
+    known,
+    measured,
+    millimetres,
+    number,
+    solution_name,
+)
 from cell.report.sections.drawing import drawing
 
 _NO_ROBOT = "No flange pose was logged, so the camera's true positions are not known."
@@ -29,8 +36,65 @@ def poses(data: ReportData) -> str:
         "axis, positive towards the board). Compare Figs. 4 and 15 of the paper.",
         _NO_ROBOT,
     )
-    return html.section("arm", "Arm and mount: where the camera was", positions, errors,
-                        _solved(data))  # fmt: skip
+    title = "Arm and mount: where the camera was"
+    return html.section(
+        "arm", title, positions, errors, _agreement(data), _solved(data), _noise(data)
+    )
+
+
+def _agreement(data: ReportData) -> str:
+    """Every solution against the robot: by the common yardstick, and by its own, kinder one."""
+    rows = [
+        (solution_name(name), *_agrees(solution))
+        for name, solution in data.solutions.items()
+        if solution.get("camera_position_error_m")
+    ]
+    if not rows:
+        return ""
+    head = ("solution", "camera RMS (mm)", "own hand-eye: camera RMS (mm)",
+            "own hand-eye: board RMS (mm)", "turn RMS (°)", "robot's distances used")  # fmt: skip
+    return html.table(head, rows, "Agreement with the robot") + html.paragraph(
+        "The first column holds every solution against the same hand-eye and board poses, those of "
+        "the joint fit. “Own hand-eye” solves them anew from that solution alone, which hides "
+        "constant errors. Where the robot's distances were used, agreement along the optical axis "
+        "is built in and proves nothing by itself.",
+        "small",
+    )
+
+
+def _agrees(solution: Mapping[str, Any]) -> tuple[str, ...]:
+    error = solution["camera_position_error_m"]
+    own, consistency = error.get("own_hand_eye") or {}, solution.get("robot_consistency") or {}
+    used = error.get("robot_in_it")
+    return (
+        number(_thousandths(error.get("rms"))),
+        number(_thousandths(own.get("rms"))),
+        number(_thousandths(consistency.get("rms_m"))),
+        number(_degrees(consistency.get("rms_rad"))),
+        UNKNOWN if used is None else ("yes" if used else "no"),
+    )
+
+
+def _noise(data: ReportData) -> str:
+    robot = (data.calibration or {}).get("robot")
+    if not robot:
+        return ""
+    outliers = ", ".join(str(frame) for frame in robot.get("outliers") or []) or "none"
+    words = (
+        f"Noise the joint fit estimated: flange {millimetres(robot.get('flange_sigma_m'))} and "
+        f"{number(_degrees(robot.get('flange_sigma_rad')), '°', 2)} per axis, corners "
+        f"{number(robot.get('corner_sigma_px'), 'px', 2)}. Frames whose logged pose disagrees with "
+        f"their picture: {outliers}."
+    )
+    return html.paragraph(words)
+
+
+def _thousandths(value: float | None) -> float | None:
+    return value * 1e3 if known(value) else None
+
+
+def _degrees(value: float | None) -> float | None:
+    return math.degrees(value) if known(value) else None
 
 
 def _solved(data: ReportData) -> str:

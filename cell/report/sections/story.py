@@ -14,11 +14,10 @@ from cell.report.figures import proof
 from cell.report.numbers import (
     UNKNOWN,
     known,
-    measured,
     millimetres,
     number,
+    parameters,
     probability,
-    symbol,
 )
 from cell.report.sections.answer import verdict_words
 from cell.report.sections.drawing import drawing
@@ -71,7 +70,7 @@ def _effect(data: ReportData, effect: Mapping[str, Any]) -> str:
         ("question", "answer"),
         [
             ("What it is", effect.get("physics") or "not described"),
-            ("How large", _sizes(effect)),
+            ("How large", parameters(effect.get("parameters") or {}) or "no parameters"),
             ("How sure", f"p {probability(effect.get('p_value'))}; held-out frames improve by "
                          f"{number(effect.get('holdout_gain_px'), 'px', 2)}"),
             ("What it costs", _cost(data, effect)),
@@ -94,14 +93,6 @@ def _picture(data: ReportData, effect: Mapping[str, Any]) -> str:
         f"{name}. {picture.look_for}",
         f"Not drawn: it needs {picture.needs}.",
     )
-
-
-def _sizes(effect: Mapping[str, Any]) -> str:
-    parts = [
-        f"{symbol(name)} = {measured(entry['value'], entry.get('sigma'), entry.get('unit', ''))}"
-        for name, entry in (effect.get("parameters") or {}).items()
-    ]
-    return "; ".join(parts) or "no parameters"
 
 
 def _cost(data: ReportData, effect: Mapping[str, Any]) -> str:

@@ -84,3 +84,5 @@ def _independence(data: ReportData) -> Iterator[str]:
             "Camera and robot were matched on these same frames: an error common to all of them, "
             "such as a wrong scale of robot or board, would not show. Check with a known length."
         )
+    for frame in ((data.calibration or {}).get("robot") or {}).get("outliers") or []:
+        yield f"Frame {frame}: the logged pose disagrees with the picture; look at that frame."
