@@ -6,6 +6,7 @@ The loop that also owns the arm must not.
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from typing import TypeVar
 
 from drivers.errors import DeviceUnreachable
 
+_log = logging.getLogger(__name__)
 T = TypeVar("T")
 _Job = Callable[[], None]
 
@@ -73,4 +75,15 @@ def _run(job: Callable[[], T], outcome: Future[T]) -> None:
     try:
         outcome.set_result(job())
     except BaseException as error:  # the caller gets it, whatever it is
-        outcome.set_exception(error)
+        _log.debug("failed", exc_info=True)
+        outcome.set_exception(_bare(error))
+
+
+def _bare(error: BaseException) -> BaseException:
+    """The error without the frames it came through.
+
+    They hold the device's objects, whose destructors may block for seconds, and would do so in
+    the caller's thread, whenever it happens to let go of the error.
+    """
+    error.__context__ = None
+    return error.with_traceback(None)

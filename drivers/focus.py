@@ -87,7 +87,8 @@ class FocusControl:
             self._features.write(self._names.auto, self._names.auto_once)
         elif setting.position is not None:
             self._features.write(self._names.position, setting.position)
-        self._wait_until_ready()
+        if setting.mode != "hold" or self._busy():
+            self._wait_until_ready()
         return self._confirmed(setting)
 
     def _require(self, setting: FocusSetting) -> None:
@@ -125,12 +126,12 @@ class FocusControl:
 
     def _wait_until_ready(self) -> None:
         deadline_s = time.monotonic() + self._timeout_s
-        in_a_row = 0
+        in_a_row = 0 if self._busy() else 1
         while in_a_row < _READY_IN_A_ROW:
+            time.sleep(_POLL_S)
             in_a_row = 0 if self._busy() else in_a_row + 1
             if time.monotonic() > deadline_s:
                 raise DeviceError(f"the lens was not ready after {self._timeout_s:g} s")
-            time.sleep(_POLL_S)
 
     def _confirmed(self, setting: FocusSetting) -> float | None:
         got = self.position()

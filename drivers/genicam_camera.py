@@ -38,9 +38,13 @@ class GenICamOptions:
         Set when connecting, and again after a reconnection; None leaves the camera's own.
     pixel_format:
         One of `drivers.genicam_pixels.PIXEL_FORMATS`.
+    features:
+        Further features to set when connecting, by name.
     software_trigger:
-        False for a camera that cannot be triggered and streams by itself: a grab then drops every
-        frame that may have been exposed before it was called.
+        False for a camera that cannot be triggered and streams by itself.
+    stale_frames:
+        Without a trigger: how many newly arrived frames may have been exposed before the grab was
+        called and are dropped; two where exposure and transfer overlap.
     names, focus_names:
         The camera's names for its features.
     connect_timeout_s, setting_timeout_s, focus_timeout_s:
@@ -50,7 +54,9 @@ class GenICamOptions:
     exposure_s: float | None = None
     gain_db: float | None = None
     pixel_format: str = "Mono8"
+    features: Mapping[str, float | str] = field(default_factory=dict)
     software_trigger: bool = True
+    stale_frames: int = 2
     names: FeatureNames = field(default_factory=FeatureNames)
     focus_names: FocusNames = field(default_factory=FocusNames)
     connect_timeout_s: float = 20.0
@@ -69,7 +75,7 @@ class GenICamCamera(ABC):
     """A camera behind a `Session`; see `drivers.camera.Camera` for what its calls do.
 
     A camera that is lost raises `DeviceUnreachable` until `connect` is called again, which opens
-    it anew with the settings it had.
+    it anew with the exposure, gain and focus position it had.
     """
 
     tried_on_hardware = False
@@ -83,6 +89,7 @@ class GenICamCamera(ABC):
         self._now: _Open | None = None
         self._wanted = {"exposure_s": self.options.exposure_s, "gain_db": self.options.gain_db}
         self._values: dict[str, float] = {}
+        self._focus_wanted: FocusSetting | None = None
         self._lost = False
         self._unanswered_trigger = False
 
@@ -106,7 +113,7 @@ class GenICamCamera(ABC):
         """
         if not self.tried_on_hardware:
             warn_untried(self.device, self.tried_on, "Look at the first pictures before a run.")
-        self._bounded.call(self._connect, self.options.connect_timeout_s, "open")
+        self._ask(self._connect, "open", self.options.connect_timeout_s)
 
     def configure(
         self, *, exposure_s: float | None = None, gain_db: float | None = None
@@ -117,7 +124,7 @@ class GenICamCamera(ABC):
     def focus(self, setting: FocusSetting) -> float | None:
         """Focus, wait until the lens is ready; returns its position in steps, None if unknown."""
         wait_s = self.options.focus_timeout_s + self.options.setting_timeout_s
-        return self._ask(lambda: self._require_open().focus.set(setting), "focus", wait_s)
+        return self._ask(lambda: self._focus(setting), "focus", wait_s)
 
     def grab(self, timeout_s: float) -> Frame:
         """Trigger and return that frame; one that comes incomplete is taken again in the time.
@@ -159,6 +166,10 @@ class GenICamCamera(ABC):
         except DeviceUnreachable:
             self._lost = True
             raise
+        except DeviceRefused as error:
+            if self.device in str(error):
+                raise
+            raise DeviceRefused(f"{self.device}: {error}") from None
 
     def _require_open(self) -> _Open:
         if self._now is None:
@@ -183,10 +194,12 @@ class GenICamCamera(ABC):
     def _prepared(self, session: Session) -> _Open:
         options = self.options
         settings = CameraSettings(session.features, options.names)
-        settings.prepare(options.pixel_format)
+        settings.prepare(options.pixel_format, options.features)
         self._values = settings.set(self._wanted["exposure_s"], self._wanted["gain_db"])
         self._set_trigger(session)
         focus = FocusControl(session.features, options.focus_names, options.focus_timeout_s)
+        if self._focus_wanted and focus.available:
+            focus.set(self._focus_wanted)
         session.arm()
         return _Open(session, settings, focus)
 
@@ -217,6 +230,13 @@ class GenICamCamera(ABC):
         asked = {"exposure_s": exposure_s, "gain_db": gain_db}
         self._wanted |= {name: value for name, value in asked.items() if value is not None}
         return self._values
+
+    def _focus(self, setting: FocusSetting) -> float | None:
+        reached = self._require_open().focus.set(setting)
+        self._focus_wanted = (
+            FocusSetting("hold") if reached is None else FocusSetting("position", reached)
+        )
+        return reached
 
     def _grab(self, deadline_s: float) -> Frame:
         session = self._require_open().session
@@ -260,7 +280,8 @@ class GenICamCamera(ABC):
         self._unanswered_trigger = True
         if self.options.software_trigger:
             session.features.execute("TriggerSoftware")
-        else:
+            return
+        for _ in range(self.options.stale_frames):
             self._fetch(session, deadline_s)
 
     def _fetch(self, session: Session, deadline_s: float) -> RawFrame:

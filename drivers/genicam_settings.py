@@ -7,6 +7,7 @@ vendor's names go into `FeatureNames`.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drivers.errors import DeviceRefused
@@ -68,14 +69,19 @@ class CameraSettings:
         found = {"exposure": self._exposure, "gain": self._gain}
         return frozenset(name for name, feature in found.items() if feature)
 
-    def prepare(self, pixel_format: str) -> None:
-        """Autos off, whole sensor, pixel format; raises `DeviceRefused` where it is not so."""
+    def prepare(self, pixel_format: str, features: Mapping[str, float | str]) -> None:
+        """Autos off, whole sensor, pixel format, then `features` by name, each read back.
+
+        Raises `DeviceRefused` where the camera does not have what was set.
+        """
         for name in self._names.autos:
             if self._features.has(name):
                 self._set(name, "Off")
         for name, value in self._names.full_frame:
             self._set_full_frame(name, value)
         self._set("PixelFormat", pixel_format)
+        for name, value in features.items():
+            self._set(name, value)
 
     def set(self, exposure_s: float | None, gain_db: float | None) -> dict[str, float]:
         """Set what is given; returns `exposure_s` and `gain_db` as the camera then has them."""
@@ -125,22 +131,27 @@ class CameraSettings:
     def _set(self, name: str, value: float | str) -> None:
         self._features.write(name, value)
         got = self._features.read(name)
-        if got != value:
+        if not _alike(got, value):
             raise DeviceRefused(f"{name} set to {value}, the camera has {got}")
 
     def _set_full_frame(self, name: str, value: int | str) -> None:
         if not self._features.has(name):
             return
-        if isinstance(value, str):
-            if not self._features.has(value):
-                return
-            value = int(self._features.read(value))
-        if self._number(name) != value:
-            self._set(name, value)
+        if isinstance(value, str) and not self._features.has(value):
+            return
+        wanted = self._number(value) if isinstance(value, str) else float(value)
+        if self._number(name) != wanted:
+            self._set(name, wanted)
 
 
 def _first(features: Features, names: tuple[str, ...]) -> str | None:
     return next((name for name in names if features.has(name)), None)
+
+
+def _alike(got: float | str, wanted: float | str) -> bool:
+    if isinstance(got, str) or isinstance(wanted, str):
+        return got == wanted
+    return math.isclose(got, wanted, rel_tol=_RELATIVE_TOLERANCE, abs_tol=1e-9)
 
 
 def _missing(what: str, names: tuple[str, ...]) -> str:

@@ -1,0 +1,112 @@
+"""The Robotiq vision server's HTTP interface, each request within a deadline.
+
+`current.jpg` and its parameters are what users of the URCap rely on; `getcamerasettings` and
+`setcamerasettings` are undocumented, were read off one firmware, and may be missing.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import time
+from typing import Any
+
+from drivers.errors import DeviceError, DeviceUnreachable, FrameLost
+
+PORT = 4242
+_CHUNK_BYTES = 1 << 16
+
+
+class RobotiqHttp:
+    """One keep-alive connection to the vision server at `host`, `port`."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self.name = f"Robotiq camera {host}:{port}"
+        self._connection = http.client.HTTPConnection(host, port)
+
+    def picture(self, deadline_s: float) -> bytes:
+        """The newest picture, a JPEG file.
+
+        Raises
+        ------
+        FrameLost
+            What came is cut short or no JPEG.
+        """
+        body = self._request("GET", "/current.jpg?type=color", None, deadline_s)
+        if not (body.startswith(b"\xff\xd8") and body.rstrip(b"\0").endswith(b"\xff\xd9")):
+            raise FrameLost(f"{self.name}: what came as a picture is no whole JPEG file")
+        return body
+
+    def settings(self, deadline_s: float) -> dict[str, Any] | None:
+        """The camera's settings by name, or None where this firmware does not tell them."""
+        try:
+            body = self._request("GET", "/getcamerasettings", None, deadline_s)
+            settings = json.loads(body)["cameraSettings"]
+        except (DeviceError, ValueError, KeyError, TypeError) as error:
+            if isinstance(error, DeviceUnreachable):
+                raise
+            return None
+        return settings if isinstance(settings, dict) else None
+
+    def change(self, settings: dict[str, Any], deadline_s: float) -> None:
+        """Write all settings back, some of them changed."""
+        body = json.dumps({"cameraSettings": settings}, separators=(",", ":"))
+        self._request(
+            "POST", "/setcamerasettings?setManualValuesIfModeChanged=true", body, deadline_s
+        )
+
+    def set_display_size(self, width: int, height: int, deadline_s: float) -> None:
+        """Ask for pictures of that size; they may take seconds to come."""
+        self._request("GET", f"/setdisplaysize?width={width}&height={height}", None, deadline_s)
+
+    def close(self) -> None:
+        """Close the connection. Idempotent."""
+        self._connection.close()
+
+    def _request(self, verb: str, path: str, body: str | None, deadline_s: float) -> bytes:
+        reused = self._connection.sock is not None
+        try:
+            try:
+                return self._once(verb, path, body, deadline_s)
+            except (http.client.RemoteDisconnected, BrokenPipeError, ConnectionResetError):
+                # a server may close an idle connection at any time: that is no fault yet
+                if not reused:
+                    raise
+                self._connection.close()
+                return self._once(verb, path, body, deadline_s)
+        except (OSError, http.client.HTTPException) as error:
+            self._connection.close()
+            if isinstance(error, http.client.IncompleteRead):
+                raise FrameLost(f"{self.name}: the answer was cut short") from None
+            reason = str(error) or type(error).__name__
+            raise DeviceUnreachable(
+                f"{self.name}: {reason}; check the robot's address and that the Robotiq "
+                "camera's URCap runs"
+            ) from None
+
+    def _once(self, verb: str, path: str, body: str | None, deadline_s: float) -> bytes:
+        self._limit(deadline_s)
+        headers = {"Content-Type": "text/plain"} if body else {}
+        self._connection.request(verb, path, body, headers)
+        self._limit(deadline_s)
+        answer = self._connection.getresponse()
+        parts = []
+        while chunk := answer.read1(_CHUNK_BYTES):
+            parts.append(chunk)
+            self._limit(deadline_s)
+        missing_bytes = answer.length
+        answer.close()
+        whole = b"".join(parts)
+        if missing_bytes:
+            raise http.client.IncompleteRead(whole, missing_bytes)
+        if answer.status != http.client.OK:
+            raise DeviceError(f"{self.name}: {path} answers {answer.status} {answer.reason}")
+        return whole
+
+    def _limit(self, deadline_s: float) -> None:
+        left_s = deadline_s - time.monotonic()
+        if left_s <= 0:
+            raise TimeoutError("no answer in time")
+        self._connection.timeout = left_s
+        if self._connection.sock is not None:
+            self._connection.sock.settimeout(left_s)
