@@ -130,7 +130,8 @@ class ReportData:
     simulated:
         True when no real camera was involved; puts the banner on the page.
     thumbnail:
-        Gives the picture of a frame (grey or BGR, any size), or None where there is none.
+        Gives the picture of a frame (grey or BGR, 8 bit, any size), or None where there is none;
+        called from several threads.
     made:
         How it was made: versions, plan hash, seed, dates; shown as a table.
     """

@@ -63,15 +63,13 @@ def number(value: float | None, unit: str = "", digits: int = 3) -> str:
     return _join(_fixed(value, _decimals(value, digits)), unit)
 
 
-def measured(
-    value: float | None, sigma: float | None, unit: str = "", without: str = " (± not known)"
-) -> str:
-    """Value ± one sigma, both to two digits of sigma; `without` follows where sigma is unknown."""
+def measured(value: float | None, sigma: float | None, unit: str = "") -> str:
+    """Value ± one sigma, both to two digits of sigma; says so where sigma is unknown."""
     if not known(value):
         return UNKNOWN
     value, sigma, unit = _readable(value, sigma, unit)
     if not known(sigma) or sigma <= 0:
-        return f"{number(value, unit, 5)}{without}"
+        return f"{number(value, unit, 5)} (± not known)"
     return _join(plus_minus(value, sigma), unit)
 
 
@@ -142,4 +140,6 @@ def _superscript(power: int) -> str:
 
 def _join(text: str, unit: str) -> str:
     pretty = unit.replace("^2", "²").replace(" m", "·m")
-    return text if unit in ("", "1") else f"{text} {pretty}"
+    if unit in ("", "1"):
+        return text
+    return f"{text}°" if unit == "°" else f"{text} {pretty}"

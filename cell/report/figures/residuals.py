@@ -75,11 +75,11 @@ def _histogram(ax: Axes, residual: FloatArray) -> None:
     for axis, colour, line, name in looks:
         values = residual[..., axis][np.isfinite(residual[..., axis])]
         ax.hist(values, edges.tolist(), density=True, histtype="step", color=colour, linestyle=line,
-                linewidth=1.3, label=f"{name}: σ {values.std():.3g} px")  # fmt: skip
+                linewidth=1.3, label=f"{name}: σ {values.std():.2g} px")  # fmt: skip
     # the middle of the residuals says how wide the bell would be without outliers
     middle = 1.4826 * float(np.nanmedian(np.abs(residual)))
     ax.plot(edges, norm.pdf(edges, scale=middle), color="#5b616b", linewidth=1,
-            label=f"normal, robust σ {middle:.3g} px")  # fmt: skip
+            label=f"normal, robust σ {middle:.2g} px")  # fmt: skip
     ax.set(title="histogram", xlabel="residual (px)", ylabel="density (1/px)")
     ax.set_ylim(top=ax.get_ylim()[1] * 1.35)
     ax.legend(loc="upper left", fontsize=8)

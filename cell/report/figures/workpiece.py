@@ -81,6 +81,8 @@ def draw(data: ReportData) -> Figure | None:
     drawn = {name: error for name, error in found.items() if error is not None}
     if not drawn:
         return None
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     figure, (ax,) = panels(5.3, 3.4)
     for name, error in drawn.items():
         look = style(name)
@@ -90,7 +92,9 @@ def draw(data: ReportData) -> Figure | None:
         middle = [(low + high) / 2 for low, high, _, _ in steps]
         ax.plot(middle, [rms * 1e3 for *_, rms in steps], label=solution_name(name), **look)
     ax.set_yscale("log")
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(NullFormatter())
     ax.set(xlabel="distance (m)", ylabel="error at the work piece (mm)")
     legend_below(figure, [ax], columns=2)
     return figure

@@ -65,8 +65,10 @@ def usable_m(data: ReportData) -> tuple[float, float] | None:
     zones: dict[str, Any] = calibration.get("zones") or {}
     law = (calibration.get("focus_law") or {}).get("law")
     if law == "constant":
-        low = max(low, zones.get("near_limit_m") or low)
-        high = min(high, zones.get("far_limit_m") or high)
+        if not zones.get("near_is_bound"):
+            low = max(low, zones.get("near_limit_m") or low)
+        if not zones.get("far_is_bound"):
+            high = min(high, zones.get("far_limit_m") or high)
     return low, high
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from cell.report.numbers import number
 
 _WIDTH_PX = 220
 _MOST = 240
+_READERS = 4
 
 
 def frames(data: ReportData) -> str:
@@ -29,7 +31,9 @@ def frames(data: ReportData) -> str:
         words += f" {len(shown)} of {len(numbers)} are shown; every rejected one is."
     if data.thumbnail is None:
         words += " Pictures were not kept: only the corners are drawn."
-    grid = "".join(_frame(data, frame, rejected.get(frame)) for frame in shown)
+    # reading and shrinking pictures is most of a report's time, and both leave the interpreter free
+    with ThreadPoolExecutor(max_workers=_READERS) as readers:
+        grid = "".join(readers.map(lambda f: _frame(data, f, rejected.get(f)), shown))
     return html.section("frames", "Every frame", html.paragraph(words), _reasons(rejected),
                         f'<div class="thumbs">{grid}</div>')  # fmt: skip
 
@@ -76,11 +80,12 @@ def _corner_paths(corners: FloatArray, cols: int, width_px: int) -> Iterator[str
     """All corners as dots, the first row again as a line that tells its start."""
     dots = "".join(f"M{u:.0f} {v:.0f}h0" for u, v in corners if np.isfinite(u))
     if dots:
-        yield f'<path class="corners" stroke-width="{width_px / 64:.0f}" d="{dots}"/>'
+        yield f'<path class="halo" stroke-width="{width_px / 42:.0f}" d="{dots}"/>'
+        yield f'<path class="corners" stroke-width="{width_px / 70:.0f}" d="{dots}"/>'
     first = [f"{u:.0f} {v:.0f}" for u, v in corners[:cols] if np.isfinite(u)]
     if len(first) > 1:
         path = "M" + "L".join(first)
-        yield f'<path class="first-row" stroke-width="{width_px / 160:.1f}" d="{path}"/>'
+        yield f'<path class="first-row" stroke-width="{width_px / 110:.1f}" d="{path}"/>'
 
 
 def _inline_image(picture: Image | None, width_px: int, height_px: int) -> str:

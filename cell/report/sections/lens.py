@@ -8,7 +8,7 @@ from typing import Any
 from cell.report import html
 from cell.report.data import ReportData
 from cell.report.figures import scale_factors
-from cell.report.numbers import UNKNOWN, known, measured, number, parameters
+from cell.report.numbers import UNKNOWN, known, measured, number, parameters, plus_minus
 from cell.report.sections.drawing import drawing
 
 _FORMULAS = {
@@ -43,7 +43,9 @@ def _zones(data: ReportData, zones: Mapping[str, Any] | None) -> str:
     if not zones:
         reason = (data.calibration or {}).get("zones_reason") or data.why_missing("zones")
         return f"Zones were not found: {reason}."
-    near = measured(zones["near_limit_m"], zones.get("near_sigma_m"), "m", without="")
+    near = number(zones["near_limit_m"], "m")
+    if known(zones.get("near_sigma_m")):
+        near = f"{plus_minus(zones['near_limit_m'], zones['near_sigma_m'])} m"
     near = f"at most {near}" if zones.get("near_is_bound") else near
     far = number(zones["far_limit_m"], "m")
     far = f"at least {far}" if zones.get("far_is_bound") else far
@@ -52,7 +54,7 @@ def _zones(data: ReportData, zones: Mapping[str, Any] | None) -> str:
     return (
         f"One scale factor holds (zone 2) from {near} to {far}: α = {alpha}, β = {beta}. Nearer, "
         "it follows the focus (zone 1); farther, the board is too small in the picture to tell "
-        f"(zone 3). {zones.get('why') or ''}"
+        f"(zone 3). {_sentence(zones.get('why'))}"
     )
 
 
@@ -64,7 +66,7 @@ def _law(data: ReportData, law: Mapping[str, Any] | None) -> str:
     prefer = "decisively" if law.get("decisive") else "but not decisively"
     title = (
         f"Focus law the data prefer, {prefer}: {_words(name)}, {_FORMULAS.get(name, '')}. "
-        f"{law.get('why') or ''}"
+        f"{_sentence(law.get('why'))}"
     )
     candidates = law.get("candidates") or [law]
     best = min((c["aicc"] for c in candidates if known(c.get("aicc"))), default=None)
@@ -80,6 +82,11 @@ def _law(data: ReportData, law: Mapping[str, Any] | None) -> str:
 def _difference(law: Mapping[str, Any], best: float | None) -> str:
     aicc = law.get("aicc")
     return UNKNOWN if best is None or not known(aicc) else f"{aicc - best:.1f}"
+
+
+def _sentence(words: object) -> str:
+    text = str(words or "").rstrip(".")
+    return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
 def _words(name: object) -> str:

@@ -26,7 +26,10 @@ def not_logged(data: ReportData) -> Iterator[str]:
         yield "Flange poses were not logged: nothing can be said about errors in millimetres."
         return
     columns = (
-        (views.joints_rad, "Joint angles were not logged: faults of single joints stay hidden."),
+        (
+            views.joints_rad,
+            "Joint angles were not logged: faults of single joints are hard to tell apart.",
+        ),
         (views.t_s, "Times were not logged: drifts stay hidden."),
         (views.temperature_c, "Temperature was not logged: drift can only be seen against time."),
         (
