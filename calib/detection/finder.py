@@ -11,16 +11,18 @@ from numpy.typing import NDArray
 from calib.detection.candidates import find_candidates
 from calib.detection.grid import Grid, in_board_order, place_board, with_predictions
 from calib.detection.lattice import grow_lattices
-from calib.detection.refine import Fitted, doubtful, fit_grid, starts
+from calib.detection.refine import Fitted, doubtful, fit_closely, fit_grid, starts
 from calib.detection.result import Detection, FloatArray, Rejected
 from calib.detection.saddle import CONTRAST, PIXEL_VARIANCE, WIDTH, X, Y
 from calib.views import Board
 
 FloatImage = NDArray[np.float32]
 
-_FIRST_LEVEL_PIXELS = 1.0e6
+_FIRST_LEVEL_PIXELS = 0.4e6
 _SMALLEST_SIDE_PX = 100
 _MOST_PIECES = 3
+# a fit at this scale tells the shading and the bend of the lines well enough
+_GOOD_ENOUGH_SCALE = 0.5
 
 
 def _scales(shape: tuple[int, ...]) -> list[float]:
@@ -29,7 +31,7 @@ def _scales(shape: tuple[int, ...]) -> list[float]:
     while shape[0] * shape[1] * 0.25**first > _FIRST_LEVEL_PIXELS:
         first += 1
     coarser = [s for s in (first + 1, first + 2) if min(shape[:2]) * 0.5**s >= _SMALLEST_SIDE_PX]
-    return [0.5**s for s in (first, *coarser[:1], *range(first - 1, -1, -1), *coarser[1:])]
+    return [0.5**s for s in (first, *range(first - 1, -1, -1), *coarser)]
 
 
 def _scaled(image: FloatImage, scale: float) -> FloatImage:
@@ -132,8 +134,7 @@ def find_chessboard(image: FloatImage, board: Board, limit: float) -> Detection 
             continue
         scale, grid, coarse = found
         first = _enlarged(coarse.parameters, scale)
-        rough = fit_grid(image, first, iterations=4) if scale < 1.0 else coarse
-        fine = fit_grid(image, rough.parameters, bent=True)
+        fine = fit_closely(image, first, rough=scale < _GOOD_ENOUGH_SCALE)
         doubt = doubtful(fine, first[..., [X, Y]], grid.first_dark)
         if doubt.any():
             best = Rejected(

@@ -184,7 +184,7 @@ def turns_to_agree(
     shift = (_turns_by_robot(robot, camera[posed], turns) - chosen[posed]) % 4
     last = np.searchsorted(posed, np.arange(len(chosen)), side="right") - 1
     chosen = (chosen + shift[np.maximum(last, 0)]) % 4
-    return (chosen - chosen[0]) % 4
+    return np.asarray((chosen - chosen[0]) % 4)
 
 
 def orient(

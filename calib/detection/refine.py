@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +20,10 @@ from calib.detection.saddle import (
     Y,
     fit_corners,
 )
+
+# blur as a share of a square from which on neighbouring corners reach into the window
+_MIXING_BLUR = 0.17
+_VAGUE_BLUR = 0.1
 
 
 @dataclass(frozen=True)
@@ -90,14 +95,14 @@ def starts(image: NDArray[np.float32], corners_px: FloatArray) -> FloatArray:
     return guess
 
 
-def _smoothed_gradient(values: FloatArray, steps: FloatArray) -> FloatArray:
+def _image_gradient(values: FloatArray, steps: FloatArray) -> FloatArray:
     """(rows, cols, 2) image gradient of a quantity known at the corners."""
     by_col = np.gradient(values, axis=1)
     by_row = np.gradient(values, axis=0)
     det = steps[..., 0] * steps[..., 3] - steps[..., 1] * steps[..., 2]
     gx = (by_col * steps[..., 3] - by_row * steps[..., 1]) / det
     gy = (by_row * steps[..., 0] - by_col * steps[..., 2]) / det
-    return np.stack([_box3(gx), _box3(gy)], axis=-1)
+    return np.stack([gx, gy], axis=-1)
 
 
 def _box3(values: FloatArray) -> FloatArray:
@@ -106,6 +111,15 @@ def _box3(values: FloatArray) -> FloatArray:
     return np.asarray(
         sum(padded[i : i + rows, j : j + cols] for i in range(3) for j in range(3)) / 9
     )
+
+
+def _quadratic(values: FloatArray) -> FloatArray:
+    """The values replaced by the quadratic surface through them."""
+    row, col = np.meshgrid(*(np.linspace(-1, 1, n) for n in values.shape), indexing="ij")
+    basis = np.stack([np.ones_like(row), row, col, row * row, row * col, col * col], axis=-1)
+    basis = basis.reshape(-1, 6)
+    weights = np.linalg.lstsq(basis, values.reshape(-1), rcond=None)[0]
+    return np.asarray((basis @ weights).reshape(values.shape))
 
 
 def _curvature(corners_px: FloatArray, axis: int) -> FloatArray:
@@ -121,26 +135,35 @@ def _curvature(corners_px: FloatArray, axis: int) -> FloatArray:
     return _box3(np.moveaxis(turning, 0, axis))
 
 
+def _blur_share(parameters: FloatArray) -> float:
+    """The typical edge width as a share of a square's shorter side."""
+    shortest = _shortest_step(lattice_steps(parameters[..., [X, Y]]))
+    return float(np.nanmedian(parameters[..., WIDTH] / shortest))
+
+
 def _shapes(fitted: FloatArray | None, steps: FloatArray) -> FloatArray:
     """(rows, cols, 6) what `saddle.fit_corners` takes as given, from an earlier fit if any."""
     shapes = np.zeros((*steps.shape[:2], 6))
     if fitted is not None:
+        # wide blur leaves each corner's own levels too vague for differences between them
+        smooth = _quadratic if _blur_share(fitted) > _VAGUE_BLUR else _box3
         sign = np.sign(fitted[..., CONTRAST])[..., None]
-        shapes[..., 0:2] = _smoothed_gradient(fitted[..., MEAN], steps)
-        shapes[..., 2:4] = sign * _smoothed_gradient(np.abs(fitted[..., CONTRAST]), steps)
+        shapes[..., 0:2] = _image_gradient(smooth(fitted[..., MEAN]), steps)
+        shapes[..., 2:4] = sign * _image_gradient(smooth(np.abs(fitted[..., CONTRAST])), steps)
         shapes[..., 4] = _curvature(fitted[..., [X, Y]], axis=1)
         shapes[..., 5] = _curvature(fitted[..., [X, Y]], axis=0)
     return shapes
 
 
-def _extended(values: FloatArray) -> FloatArray:
-    """One more ring of lattice points around, by straight continuation."""
-    for axis in (0, 1):
-        first, last = values.take([0, 1], axis), values.take([-1, -2], axis)
-        before = 2 * first.take([0], axis) - first.take([1], axis)
-        after = 2 * last.take([0], axis) - last.take([1], axis)
-        values = np.concatenate([before, values, after], axis=axis)
-    return values
+def _extended(corners_px: FloatArray) -> FloatArray:
+    """One more ring of lattice points around, where a homography through the others has them."""
+    rows, cols = corners_px.shape[:2]
+    place = np.argwhere(np.ones((rows + 2, cols + 2)))[:, ::-1].reshape(rows + 2, cols + 2, 2) - 1.0
+    inner = place[1:-1, 1:-1].reshape(-1, 2)
+    H, _ = cv2.findHomography(inner, corners_px.reshape(-1, 2))
+    expected = cv2.perspectiveTransform(place.reshape(1, -1, 2), H).reshape(place.shape)
+    misfit = corners_px - expected[1:-1, 1:-1]
+    return np.asarray(expected + np.pad(misfit, ((1, 1), (1, 1), (0, 0)), mode="edge"))
 
 
 def _neighbour_lines(corners_px: FloatArray) -> FloatArray:
@@ -166,7 +189,7 @@ def fit_grid(
     first: FloatArray,
     *,
     bent: bool = False,
-    reach: float = 0.4,
+    clear: float = 1.0,
     iterations: int = 12,
 ) -> Fitted:
     """Fit all corners of a grid from (rows, cols, 7) starts.
@@ -183,7 +206,7 @@ def fit_grid(
         steps.reshape(-1, 4),
         shapes.reshape(-1, 6),
         _neighbour_lines(first[..., [X, Y]]).reshape(-1, 4, 4),
-        reach=reach,
+        clear=clear,
         iterations=iterations,
     )
     return Fitted(
@@ -191,6 +214,22 @@ def fit_grid(
         covariance.reshape(rows, cols, 2, 2),
         residual.reshape(rows, cols),
     )
+
+
+def fit_closely(
+    image: NDArray[np.float32], first: FloatArray, *, rough: bool, clear: float = 1.0
+) -> Fitted:
+    """The last word on a grid: starts refined if `rough`, then the fit with all that bends.
+
+    Where the blur mixes neighbouring corners the fit is repeated with what the first said of
+    the neighbours.
+    """
+    if rough:
+        first = fit_grid(image, first, clear=clear, iterations=2).parameters
+    fitted = fit_grid(image, first, bent=True, clear=clear)
+    if _blur_share(fitted.parameters) > _MIXING_BLUR:
+        fitted = fit_grid(image, fitted.parameters, bent=True, clear=clear)
+    return fitted
 
 
 def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray[np.bool_]:

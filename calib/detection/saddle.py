@@ -32,6 +32,8 @@ _BOX_BELOW_PX = 0.75
 _SMALLEST_WIDTH_PX = 0.05
 # edges farther away than this many blur widths change nothing (4e-3 of C)
 _REACH_OF_BLUR = 2.9
+# the next step would be a few percent of this one
+_CONVERGED_PX = 2e-3
 _ROOT_2 = math.sqrt(2.0)
 _ROOT_2PI = math.sqrt(2.0 * math.pi)
 _NODES, _WEIGHTS = (0.5 * (part + shift) for part, shift in zip(leggauss(4), (1, 0), strict=True))
@@ -160,32 +162,65 @@ def _solve_damped(A: Any, g: Any, damping: float, step: Any) -> bool:
 
 
 @_kernel
-def _neighbour_edges(x: float, y: float, s: float, lines: Any, first: int) -> tuple[float, bool]:
-    """What the parallel edges on both sides add to an edge's profile at (x, y).
+def _neighbour_edges(x: float, y: float, s: float, lines: Any, first: int) -> tuple[float, float]:
+    """What the parallel edges on both sides do to an edge's profile at (x, y).
 
     `lines[first]` lies on the side of positive d, `lines[first + 1]` on the other; each is
-    (nx, ny, offset, known). Beyond a line that is not known to be an edge of squares (the
-    board's margin) anything may lie: False as soon as the blur could reach over it.
+    (nx, ny, offset, inner). Beyond an inner line the colours change places; beyond the rim
+    lies the board's bright margin.
+
+    Returns
+    -------
+    What is added to the profile, and the share that the margin leaves of the pattern.
     """
-    added = 0.0
+    added, left = 0.0, 1.0
     for k in range(2):
         inward = 1.0 if k == 1 else -1.0
         line = lines[first + k]
         distance = inward * (line[0] * x + line[1] * y - line[2])
         if distance > _REACH_OF_BLUR * s:
             continue
+        beyond = 1.0 - _gaussian_edge(distance, s)[0]
         if line[3] == 0.0:
-            return added, False
-        added += inward * (1.0 - _gaussian_edge(distance, s)[0])
-    return added, True
+            left *= 1.0 - 0.5 * beyond
+        else:
+            added += inward * beyond
+    return added, left
 
 
 @_kernel
-def _gather(image: Any, p: Any, steps: Any, lines: Any, reach: float, pixels: Any) -> int:
+def _neighbour_slants(x: float, y: float, p: Any, lines: Any) -> float:
+    """What the eight crossings around add where slant and blur are large, see `_slant`."""
+    s = p[WIDTH]
+    rho = math.cos(p[ANGLE_2] - p[ANGLE_1])
+    if abs(rho) < 0.03:
+        return 0.0
+    z1, z2 = np.empty(3), np.empty(3)
+    z1[0] = (math.cos(p[ANGLE_1]) * (y - p[Y]) - math.sin(p[ANGLE_1]) * (x - p[X])) / s
+    z2[0] = (math.cos(p[ANGLE_2]) * (y - p[Y]) - math.sin(p[ANGLE_2]) * (x - p[X])) / s
+    for k in range(2):
+        z1[k + 1] = (lines[k, 0] * x + lines[k, 1] * y - lines[k, 2]) / s
+        z2[k + 1] = (lines[k + 2, 0] * x + lines[k + 2, 1] * y - lines[k + 2, 2]) / s
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            inner = (i == 0 or lines[i - 1, 3] == 1.0) and (j == 0 or lines[j + 1, 3] == 1.0)
+            if i + j > 0 and inner and abs(z1[i]) < 3.0 and abs(z2[j]) < 3.0:
+                sign = 1.0 if (i == 0) == (j == 0) else -1.0
+                total += sign * _slant(z1[i], z2[j], rho)[0]
+    return total
+
+
+@_kernel
+def _gather(
+    image: Any, p: Any, steps: Any, lines: Any, reach: float, clear: float, pixels: Any
+) -> int:
     """Collect the window's pixels: all near the edges, some of the flat squares.
 
-    The window is the parallelogram of the lattice: |a|, |b| <= reach with p - c = a e1 + b e2.
-    A row of `pixels` is x, y, value, and what neighbouring edges add to the two profiles.
+    The window is the parallelogram of the lattice: |a|, |b| <= reach with p - c = a e1 + b e2,
+    without the squares' middles, |a| and |b| > clear. A row of `pixels` is x, y, value, what
+    neighbouring edges add to the two profiles, the share that the margin leaves of them, and
+    what slanted crossings nearby add to the pattern.
     """
     ax, ay, bx, by = steps
     det = ax * by - ay * bx
@@ -198,16 +233,18 @@ def _gather(image: Any, p: Any, steps: Any, lines: Any, reach: float, pixels: An
         for ix in range(max(0, int(p[X] - half_w)), min(width - 1, int(p[X] + half_w) + 1) + 1):
             dx, dy = ix - p[X], iy - p[Y]
             a, b = (dx * by - dy * bx) / det, (ax * dy - ay * dx) / det
-            if abs(a) > reach or abs(b) > reach or count == pixels.shape[0]:
+            if abs(a) > reach or abs(b) > reach or min(abs(a), abs(b)) > clear:
                 continue
             if min(abs(a) * per_a, abs(b) * per_b) > strip and (ix % 3 or iy % 3):
                 continue
-            add1, fine1 = _neighbour_edges(ix, iy, p[WIDTH], lines, 0)
-            add2, fine2 = _neighbour_edges(ix, iy, p[WIDTH], lines, 2)
-            if fine1 and fine2:
-                pixels[count, 0], pixels[count, 1], pixels[count, 2] = ix, iy, image[iy, ix]
-                pixels[count, 3], pixels[count, 4] = add1, add2
-                count += 1
+            if count == pixels.shape[0]:
+                return count
+            pixels[count, 6] = _neighbour_slants(ix, iy, p, lines)
+            add1, left1 = _neighbour_edges(ix, iy, p[WIDTH], lines, 0)
+            add2, left2 = _neighbour_edges(ix, iy, p[WIDTH], lines, 2)
+            pixels[count, 0], pixels[count, 1], pixels[count, 2] = ix, iy, image[iy, ix]
+            pixels[count, 3], pixels[count, 4], pixels[count, 5] = add1, add2, left1 * left2
+            count += 1
     return count
 
 
@@ -225,6 +262,7 @@ def _normal_equations(p: Any, pixels: Any, count: int, shape: Any, A: Any, g: An
     t2x, t2y = math.cos(p[ANGLE_2]), math.sin(p[ANGLE_2])
     rho, sine = t1x * t2x + t1y * t2y, t1x * t2y - t1y * t2x
     J[MEAN] = 1.0
+    margin = 1.0 if p[CONTRAST] > 0 else -1.0
     cost = 0.0
     for i in range(count):
         dx, dy = pixels[i, 0] - p[X], pixels[i, 1] - p[Y]
@@ -236,21 +274,24 @@ def _normal_equations(p: Any, pixels: Any, count: int, shape: Any, A: Any, g: An
         e1, e2 = e1 + pixels[i, 3], e2 + pixels[i, 4]
         z1, z2 = d1 / p[WIDTH], d2 / p[WIDTH]
         excess, by_z1, by_z2, by_rho = _slant(z1, z2, rho)
+        excess += pixels[i, 6]
+        left = pixels[i, 5]
         contrast = p[CONTRAST] + shape[2] * dx + shape[3] * dy
-        profile = e1 * e2 + excess
+        profile = left * (e1 * e2 + excess) + (1.0 - left) * margin
         residual = pixels[i, 2] - p[MEAN] - shape[0] * dx - shape[1] * dy - contrast * profile
         cost += residual * residual
         J[CONTRAST] = profile
         first = CONTRAST
         if slope1 != 0.0 or slope2 != 0.0:
-            k1 = contrast * (slope1 * e2 + by_z1 / p[WIDTH])
-            k2 = contrast * (slope2 * e1 + by_z2 / p[WIDTH])
+            pattern = left * contrast
+            k1 = pattern * (slope1 * e2 + by_z1 / p[WIDTH])
+            k2 = pattern * (slope2 * e1 + by_z2 / p[WIDTH])
             J[X] = k1 * t1y + k2 * t2y
             J[Y] = -k1 * t1x - k2 * t2x
-            J[ANGLE_1] = -k1 * along1 + contrast * by_rho * sine
-            J[ANGLE_2] = -k2 * along2 - contrast * by_rho * sine
+            J[ANGLE_1] = -k1 * along1 + pattern * by_rho * sine
+            J[ANGLE_2] = -k2 * along2 - pattern * by_rho * sine
             widening = (z1 * by_z1 + z2 * by_z2) / p[WIDTH]
-            J[WIDTH] = contrast * (widening1 * e2 + widening2 * e1 - widening)
+            J[WIDTH] = pattern * (widening1 * e2 + widening2 * e1 - widening)
             first = X
         for r in range(first, PARAMETERS):
             g[r] += J[r] * residual
@@ -276,7 +317,7 @@ def _minimise(p: Any, pixels: Any, count: int, shape: Any, A: Any, iterations: i
         if new <= cost:
             p[:], A[:], g[:] = trial, A_trial, g_trial
             cost, damping = new, damping * 0.1
-            if moved < 1e-4:
+            if moved < _CONVERGED_PX:
                 break
         else:
             damping = max(damping, 1e-4) * 10.0
@@ -294,6 +335,7 @@ def _fit(
     lines: Any,
     reach_px: float,
     reach: float,
+    clear: float,
     iterations: int,
 ) -> tuple[Any, Any, Any]:
     M = starts.shape[0]
@@ -301,11 +343,11 @@ def _fit(
     covariance = np.full((M, 2, 2), np.nan)
     residual = np.full(M, np.nan)
     A, step, unit = np.empty((PARAMETERS, PARAMETERS)), np.empty(PARAMETERS), np.empty(PARAMETERS)
-    pixels = np.empty((int((4.0 * reach_px + 8.0) ** 2), 5))
+    pixels = np.empty((int((4.0 * reach_px + 8.0) ** 2), 7))
     for i in range(M):
         p = fitted[i]
         longest = max(math.hypot(steps[i, 0], steps[i, 1]), math.hypot(steps[i, 2], steps[i, 3]))
-        count = _gather(image, p, steps[i], lines[i], min(reach, reach_px / longest), pixels)
+        count = _gather(image, p, steps[i], lines[i], min(reach, reach_px / longest), clear, pixels)
         if count <= PARAMETERS + 4:
             continue
         cost = _minimise(p, pixels, count, shapes[i], A, iterations)
@@ -331,6 +373,7 @@ def fit_corners(
     *,
     reach: float = 0.4,
     reach_px: float = 40.0,
+    clear: float = 1.0,
     iterations: int = 12,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Fit every corner from its start.
@@ -350,9 +393,11 @@ def fit_corners(
     lines:
         (M, 4, 4) the parallel neighbours of edge 1 (on the side of its normal, then the other)
         and of edge 2, each as unit normal (2), offset in pixels, and 1 where that is an edge
-        between squares, 0 where it is the rim of the board.
+        between squares, 0 where it is the rim of the board with a bright margin beyond.
     reach, reach_px:
         The window's half side as a share of the lattice step, and its limit in pixels.
+    clear:
+        Pixels farther than this share of a step from both edges are left out (markers there).
     iterations:
         Most Levenberg-Marquardt steps.
 
@@ -362,6 +407,6 @@ def fit_corners(
     of the residual in grey levels. Where the fit broke down the latter two are NaN.
     """
     fitted, covariance, residual = _fit(
-        image, starts, steps, shapes, lines, reach_px, reach, iterations
+        image, starts, steps, shapes, lines, reach_px, reach, clear, iterations
     )
     return fitted, covariance, residual
