@@ -75,6 +75,7 @@ class MotionChild:
         self._phase = Phase.STARTING
         self._since_s = time.monotonic()
         self._why = ""
+        self._was_ready = False
         threading.Thread(target=self._listen, name="ur-motion-events", daemon=True).start()
 
     @property
@@ -91,6 +92,11 @@ class MotionChild:
     def why(self) -> str:
         """Why it failed, in the words of whoever noticed."""
         return self._why
+
+    @property
+    def was_ready(self) -> bool:
+        """Whether the control script ever ran."""
+        return self._was_ready
 
     def move(self, order: MoveOrder) -> None:
         """Pass a motion on."""
@@ -131,6 +137,7 @@ class MotionChild:
         elif event["event"] == "moving":
             self._enter(Phase.MOVING)
         else:
+            self._was_ready = True
             self._enter(Phase.READY)
 
     def _enter(self, phase: Phase) -> None:

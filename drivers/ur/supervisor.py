@@ -148,9 +148,12 @@ class Supervisor:
                 self._trip(f"the driver's supervision failed: {error!r}")
 
     def _watch(self, packet: Packet) -> None:
-        fault = fault_in(packet) or self._remote.fault or self._child_fault(packet)
+        told = fault_in(packet)
+        fault = told or self._remote.fault or self._child_fault(packet)
         if fault is not None:
             self._trip(fault)
+        # the child may notice before the packet comes that tells why
+        self.fault = told or self.fault
         self._see_stop_through(packet)
         if self.fault is None and self._stop_s is None:
             self._drive(packet)
@@ -179,7 +182,7 @@ class Supervisor:
         if child is None:
             return None
         if child.phase is Phase.FAILED:
-            return child.why
+            return _why(child, packet)
         if child.phase is Phase.STARTING:
             slow = child.in_phase_s > self._settings.start_timeout_s
             return "the control script did not start in time" if slow else None
@@ -193,10 +196,7 @@ class Supervisor:
             self._playing_s = time.monotonic()
         if time.monotonic() - self._playing_s < _PROGRAM_GRACE_S:
             return None
-        return (
-            f"the control program on the robot is {runtime.name.lower()}: somebody stopped it at "
-            "the teach pendant, another client took its place, or the watchdog ended it"
-        )
+        return _program_gone(runtime)
 
     def _drive(self, packet: Packet) -> None:
         if self._child is None:
@@ -231,6 +231,19 @@ class Supervisor:
             if time.monotonic() > deadline:
                 raise DeviceError("the control script did not start in time")
             time.sleep(_CYCLE_S)
+
+
+def _program_gone(runtime: Runtime) -> str:
+    return (
+        f"the control program on the robot is {runtime.name.lower()}: somebody stopped it at the "
+        "teach pendant, another client took its place, or the watchdog ended it"
+    )
+
+
+def _why(child: MotionChild, packet: Packet) -> str:
+    runtime = Runtime(int(packet.number("runtime_state")))
+    gone = child.was_ready and runtime is not Runtime.PLAYING
+    return _program_gone(runtime) if gone else child.why
 
 
 def _missed(order: MoveOrder, packet: Packet) -> str | None:

@@ -73,6 +73,17 @@ class URController:
         port reports as the factory calibration; None to report none.
     rate_hz:
         Cycle of the control loop and highest RTDE rate.
+
+    Attributes
+    ----------
+    reserved_inputs, missing_outputs:
+        RTDE names that a fieldbus holds, or that this version does not know.
+    mute, deaf:
+        Nothing goes out; what comes in is thrown away. No connection is closed.
+    ignore_new_clients:
+        New RTDE connections are accepted and never answered.
+    events:
+        What reached the controller, and every halt of the arm.
     """
 
     def __init__(
@@ -91,8 +102,10 @@ class URController:
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         self.remote_control = True
         self.reserved_inputs: frozenset[str] = frozenset()
+        self.missing_outputs: frozenset[str] = frozenset()
         self.mute = False
         self.deaf = False
+        self.ignore_new_clients = False
         self.registers: dict[str, int | float] = {}
         self.events: list[Event] = []
         self.robot_mode = Robot.RUNNING

@@ -37,7 +37,8 @@ class ControlProgram:
 
     def __init__(self, controller: URController, source: str) -> None:
         self._controller = controller
-        offset = re.search(r"reg_offset_int = (\d+)", source)
+        # the client puts the number behind the comment that marks its place
+        offset = re.search(r"# int register offset\s+(\d+)", source)
         self._offset = int(offset.group(1)) if offset else 0
         self._busy: Callable[[], bool] | None = None
         self._operation = 0

@@ -39,6 +39,7 @@ class _Client:
     """One connection: its recipes, and whether it asked for data."""
 
     link: socket.socket
+    ignored: bool = False
     inputs: list[Recipe] = field(default_factory=list)
     outputs: Recipe | None = None
     started: bool = False
@@ -58,12 +59,12 @@ class RtdeServer:
 
     def serve(self, link: socket.socket) -> None:
         """Answer one client until it goes."""
-        client = _Client(link)
+        client = _Client(link, ignored=self._controller.ignore_new_clients)
         self._clients.append(client)
         try:
             while True:
                 kind, payload = receive(link)
-                if not self._controller.deaf:
+                if not self._controller.deaf and not client.ignored:
                     self._handle(client, kind, payload)
         finally:
             self._clients.remove(client)
@@ -97,7 +98,7 @@ class RtdeServer:
 
     def _set_outputs(self, client: _Client, listed: bytes) -> bytes:
         names = _names(listed)
-        types = [_type_of(name, _OUTPUTS) for name in names]
+        types = [self._output_type(name) for name in names]
         if "NOT_FOUND" not in types:
             client.outputs = Recipe(names, types)
         return b"\x01" + ",".join(types).encode()
@@ -108,6 +109,10 @@ class RtdeServer:
         if not {"NOT_FOUND", "IN_USE"} & set(types):
             client.inputs.append(Recipe(names, types))
         return bytes([len(client.inputs)]) + ",".join(types).encode()
+
+    def _output_type(self, name: str) -> str:
+        unknown = name in self._controller.missing_outputs
+        return "NOT_FOUND" if unknown else _type_of(name, _OUTPUTS)
 
     def _input_type(self, client: _Client, name: str) -> str:
         others = (other for other in self._clients if other is not client)
