@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from calib.calibration import Calibration, Solution
 from calib.chain.optics import COLUMN
+from calib.chain.rigid import inverse
 from calib.views import FloatArray, Views
 from cell.report.data import SolutionPoses
-from cell.report.geometry import inverse
 
 
 def solution_poses(calibration: Calibration, views: Views) -> dict[str, SolutionPoses]:

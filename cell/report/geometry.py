@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calib.chain.rigid import inverse
+from calib.handeye import camera_position_error_m
 from calib.views import Board, FloatArray
 from cell.report.data import ReportData, SolutionPoses
 
@@ -12,16 +14,6 @@ from cell.report.data import ReportData, SolutionPoses
 def centre_m(board: Board) -> FloatArray:
     """(3,) middle of the corner grid, board frame, metres."""
     return np.asarray(board.corners_m.mean(axis=0))
-
-
-def inverse(a_from_b: FloatArray) -> FloatArray:
-    """(N, 4, 4) rigid transforms inverted, without a solver, so that NaN passes through."""
-    turned = a_from_b[..., :3, :3].swapaxes(-1, -2)
-    out = np.zeros_like(a_from_b)
-    out[..., :3, :3] = turned
-    out[..., :3, 3] = -(turned @ a_from_b[..., :3, 3:])[..., 0]
-    out[..., 3, 3] = 1.0
-    return out
 
 
 def distance_m(board_from_camera: FloatArray, board: Board) -> FloatArray:
@@ -48,18 +40,7 @@ def position_error_m(
     z is the optical axis: a positive z puts the camera too close to the board, as in Figs. 4 and
     15 of Ricolfe-Viala and Esparza.
     """
-    difference = board_from_camera[:, :3, 3] - board_from_true_camera[:, :3, 3]
-    return np.asarray(np.einsum("nji,nj->ni", board_from_true_camera[:, :3, :3], difference))
-
-
-def turn_error_rad(board_from_camera: FloatArray, board_from_true_camera: FloatArray) -> FloatArray:
-    """(N,) angle between computed and true camera orientation, radians."""
-    turn = inverse(board_from_true_camera)[:, :3, :3] @ board_from_camera[:, :3, :3]
-    out = np.full(len(turn), np.nan)
-    known = np.isfinite(turn).all(axis=(1, 2))
-    if known.any():
-        out[known] = Rotation.from_matrix(turn[known]).magnitude()
-    return out
+    return camera_position_error_m(inverse(board_from_camera), inverse(board_from_true_camera))
 
 
 def workpiece_error_m(

@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calib.chain.rigid import inverse
 from calib.views import Board, FloatArray, Views
 from cell.report import Evidence, ReportData, SolutionPoses, Truth
-from cell.report.geometry import distance_m, inverse, position_error_m
+from cell.report.geometry import distance_m, position_error_m
 
 WIDTH_PX, HEIGHT_PX = 1279, 724
 BOARD = Board("chessboard", 7, 10, 0.025)
