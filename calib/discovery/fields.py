@@ -12,7 +12,6 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from calib.chain.effect import Link
-from calib.chain.kinematics import ArmKinematics
 from calib.chain.projection import project_with_jacobians
 from calib.discovery.score import Score
 from calib.solver.joint import JointFit
@@ -44,7 +43,7 @@ def cosine_modes(x: FloatArray, y: FloatArray, order: int = _ORDER) -> FloatArra
     return np.stack(waves, axis=-1)
 
 
-def field_scores(fit: JointFit, views: Views, kinematics: ArmKinematics | None) -> list[FieldScore]:
+def field_scores(fit: JointFit, views: Views) -> list[FieldScore]:
     """Test a field of pixel shifts over the image, and of heights and shifts over the board."""
     found = fit.dependence
     state = found.state

@@ -21,7 +21,6 @@ from calib.chain.empirical import (
     site_columns,
     span,
 )
-from calib.chain.kinematics import ArmKinematics
 from calib.chain.model import walk
 from calib.chain.walk import Walk
 from calib.discovery.fields import field_scores
@@ -66,15 +65,15 @@ class Cell:
         return min(1.0, self.score.p_value * self.tried)
 
 
-def locate(fit: JointFit, views: Views, kinematics: ArmKinematics | None = None) -> list[Cell]:
+def locate(fit: JointFit, views: Views) -> list[Cell]:
     """Test every site against every covariate; the most significant first."""
-    state = walk(fit.model, views, kinematics=kinematics, flange_error=fit.flange_error)
-    probe = _Probe(fit, views, state, kinematics)
+    state = walk(fit.model, views, flange_error=fit.flange_error)
+    probe = _Probe(fit, views, state)
     cells = [cell for covariate in COVARIATES for cell in probe.along(covariate)]
     cells += probe.periods()
     cells += [
         Cell(f.site, f.link, f.covariate, f.score, 1, None, f.where)
-        for f in field_scores(fit, views, kinematics)
+        for f in field_scores(fit, views)
     ]
     return sorted(cells, key=lambda cell: (cell.p_value, -cell.score.gain))
 
@@ -82,14 +81,12 @@ def locate(fit: JointFit, views: Views, kinematics: ArmKinematics | None = None)
 class _Probe:
     """One linearisation of every site, multiplied by whatever a covariate asks for."""
 
-    def __init__(
-        self, fit: JointFit, views: Views, state: Walk, kinematics: ArmKinematics | None
-    ) -> None:
+    def __init__(self, fit: JointFit, views: Views, state: Walk) -> None:
         self.fit, self.views, self.state = fit, views, state
         self.sites = site_columns(views)
         constant = Covariate("constant", "1", lambda w: np.ones((len(w.views), 1)))
         presents = [present_curve(Curve(s, constant, 0.0, 1.0), state) for s in self.sites]
-        _, self.found, unknowns, self.base = extended(fit, views, presents, kinematics)
+        _, self.found, unknowns, self.base = extended(fit, views, presents)
         first = len(fit.model.effects)
         self.owner = np.array([u.place[1] - first for u in unknowns[self.base :]])
 

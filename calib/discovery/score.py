@@ -11,10 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from calib.chain.effect import Present
-from calib.chain.kinematics import ArmKinematics
+from calib.chain.model import kinematics_of
 from calib.solver.elimination import solve_scaled
 from calib.solver.joint import JointFit, assemble
 from calib.solver.noise import JointEquations, scaled
@@ -55,7 +56,7 @@ def bic(gain: float, columns: int, views: Views) -> float:
 
 
 def conditional(
-    equations: JointEquations, fit: JointFit, extra: FloatArray
+    equations: JointEquations, fit: JointFit, extra: NDArray[np.int64]
 ) -> tuple[FloatArray, FloatArray]:
     """Information and score of the extra columns, everything fitted projected out."""
     reduced, _ = scaled(equations, fit.noise)
@@ -88,7 +89,6 @@ def extended(
     fit: JointFit,
     views: Views,
     extra: Sequence[Present],
-    kinematics: ArmKinematics | None,
 ) -> tuple[JointEquations, Dependence, tuple[Unknown, ...], int]:
     """The linearised problem of a fit with the extra effects' amounts as further columns.
 
@@ -104,7 +104,9 @@ def extended(
         if model.effects[u.place[1]].effect.parameters[u.place[2]].role == "amount"
     )
     unknowns = (*fit.unknowns, *amounts)
-    found = dependence(model, views, unknowns, kinematics=kinematics, flange_error=fit.flange_error)
+    found = dependence(
+        model, views, unknowns, kinematics=kinematics_of(views), flange_error=fit.flange_error
+    )
     shift = fit.equations.corner_shift if fit.equations.corner_numbers else None
     equations, _ = assemble(found, views, fit.weight, fit.flange_error, shift)
     return equations, found, unknowns, base
@@ -114,12 +116,11 @@ def score_effects(
     fit: JointFit,
     views: Views,
     candidates: Sequence[Present],
-    kinematics: ArmKinematics | None = None,
 ) -> list[Score]:
     """One score for each candidate effect, all from one linearisation."""
     if not candidates:
         return []
-    equations, _, unknowns, base = extended(fit, views, candidates, kinematics)
+    equations, _, unknowns, base = extended(fit, views, candidates)
     columns = np.arange(base, len(unknowns))
     information, score = conditional(equations, fit, columns)
     owner = np.array([u.place[1] for u in unknowns[base:]])

@@ -8,17 +8,15 @@ by their likelihood.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from calib.chain.effect import Present
-from calib.chain.kinematics import ArmKinematics
-from calib.chain.model import CellModel
 from calib.discovery.candidates import Candidate, candidates, finer
 from calib.discovery.score import Score, bic, score_effects
-from calib.solver.joint import JointFit, fit_joint
-from calib.solver.unknowns import unknowns_of
+from calib.discovery.start import Fitter
+from calib.solver.joint import JointFit
 from calib.views import Views
 
 DEMAND = 8.0
@@ -55,29 +53,12 @@ def criterion(fit: JointFit, views: Views, choices: int = 1) -> float:
     return -bic(-fit.minus_two_log, fit.parameters, views) + 2.0 * float(np.log(choices))
 
 
-def fit_with(
-    start: JointFit, views: Views, effects: Sequence[Present], kinematics: ArmKinematics | None
-) -> JointFit:
-    """Fit a cell with these effects, from where another fit stands."""
-    model = start.model.with_effects(effects)
-    return fit_joint(
-        model,
-        views,
-        unknowns_of(model),
-        start.noise,
-        flange_error=start.flange_error,
-        kinematics=kinematics,
-    )
-
-
 class Search:
     """Forward selection on one recording."""
 
-    def __init__(
-        self, start: JointFit, views: Views, kinematics: ArmKinematics | None = None
-    ) -> None:
-        self.views, self.kinematics = views, kinematics
-        self.best = Trial(start, criterion(start, views))
+    def __init__(self, start: JointFit, fitter: Fitter) -> None:
+        self.fitter, self.views = fitter, fitter.views
+        self.best = Trial(start, criterion(start, fitter.views))
         self.steps: list[Step] = []
 
     def run(self) -> JointFit:
@@ -99,7 +80,7 @@ class Search:
     def _best_shapes(
         self, fit: JointFit, tried: Sequence[Candidate]
     ) -> list[tuple[Candidate, Score]]:
-        scores = score_effects(fit, self.views, [c.present for c in tried], self.kinematics)
+        scores = score_effects(fit, self.views, [c.present for c in tried])
         best: dict[str, tuple[Candidate, Score]] = {}
         for candidate, score in zip(tried, scores, strict=True):
             label = candidate.effect.label
@@ -114,9 +95,7 @@ class Search:
         """Fit each candidate next to what the model has."""
         trials = []
         for candidate in picked:
-            tried = fit_with(
-                fit, self.views, (*fit.model.effects, candidate.present), self.kinematics
-            )
+            tried = self.fitter.with_effects(fit, (*fit.model.effects, candidate.present))
             trials.append(
                 (candidate, Trial(tried, criterion(tried, self.views, candidate.choices)))
             )
@@ -137,6 +116,22 @@ class Search:
         self.best = trial
         return True
 
+    def force(self, effects: Sequence[Present]) -> JointFit:
+        """Take exactly these effects, whatever the data say."""
+        fit = self.fitter.with_effects(self.best.fit, effects)
+        self.best = Trial(fit, criterion(fit, self.views))
+        return fit
+
+    def put_in(self, present: Present, choices: int = 1) -> bool:
+        """Put an effect in without a contest; False where it does not lower the criterion."""
+        fit = self.best.fit
+        tried = self.fitter.with_effects(fit, (*fit.model.effects, present))
+        value = criterion(tried, self.views, choices)
+        if value > self.best.criterion:
+            return False
+        self.best = Trial(tried, value)
+        return True
+
     def _drop(self) -> bool:
         """Drop the effect that the others have made needless, if there is one."""
         fit = self.best.fit
@@ -145,23 +140,10 @@ class Search:
             return False
         for index in range(len(effects)):
             rest = effects[:index] + effects[index + 1 :]
-            tried = fit_with(fit, self.views, rest, self.kinematics)
+            tried = self.fitter.with_effects(fit, rest)
             value = criterion(tried, self.views)
             if value < self.best.criterion + DEMAND:
                 self.best = Trial(tried, value)
+                self.steps = [s for s in self.steps if s.taken.effect != effects[index].effect]
                 return True
         return False
-
-
-def blank_effects(model: CellModel) -> CellModel:
-    """The same cell with every effect's amounts at zero."""
-    return replace(
-        model,
-        effects=tuple(
-            Present(
-                p.effect,
-                np.where([q.role == "amount" for q in p.effect.parameters], 0.0, p.values),
-            )
-            for p in model.effects
-        ),
-    )

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.calibration.baseline import Baseline
+from calib.chain.effect import Present
 from calib.chain.model import CellModel
 from calib.chain.optics import COLUMN
 from calib.handeye import HandEye, solve_hand_eye
 from calib.solver.joint import JointFit, fit_joint
 from calib.solver.noise import Noise
 from calib.solver.unknowns import unknowns_of
-from calib.views import FloatArray, Views
-
-SMALLEST_PRINT_M = 3e-6
+from calib.views import BoolArray, FloatArray, Views
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,64 @@ def noise_guess(free: FreeViews, hand_eye: HandEye) -> Noise:
     )
 
 
-def fit_plain(
-    model: CellModel, views: Views, noise: Noise, *, flange_error: FloatArray | None = None
-) -> JointFit:
-    """Fit the plain cell (with whatever effects it has) to the views."""
-    return fit_joint(model, views, unknowns_of(model), noise, flange_error=flange_error)
+UNKNOWN_POSE = (0.3, 1.0)
+"""A flange scatter (metres, radians) so large that a robot that said nothing has no say."""
+
+
+@dataclass(frozen=True)
+class Fitter:
+    """How cells are fitted to these views: with the robot's word for its poses, or without."""
+
+    views: Views
+    has_robot: bool = True
+
+    def fit(
+        self, model: CellModel, noise: Noise, flange_error: FloatArray | None = None
+    ) -> JointFit:
+        """Fit the cell, with whatever effects it has."""
+        if self.has_robot:
+            unknowns = unknowns_of(model)
+            return fit_joint(model, self.views, unknowns, noise, flange_error=flange_error)
+        unheard = replace(noise, flange_m=UNKNOWN_POSE[0], flange_rad=UNKNOWN_POSE[1])
+        unknowns = unknowns_of(model, poses=False)
+        return fit_joint(
+            model, self.views, unknowns, unheard, flange_error=flange_error, fixed_noise=True
+        )
+
+    def with_effects(self, start: JointFit, effects: Sequence[Present]) -> JointFit:
+        """Fit a cell with these effects, from where another fit stands."""
+        return self.fit(start.model.with_effects(effects), start.noise, start.flange_error)
+
+
+_PRINT_WORTH = 10.0
+"""Freeing every corner must lower -2 log likelihood by this much to be kept."""
+
+_MOST_FREE_CORNERS = 150
+_PRINT_GUESS_M = 2e-5
+
+
+def fit_start(fitter: Fitter, free: FreeViews, train: BoolArray) -> JointFit:
+    """Fit the plain cell, with printed corners free where the data ask for it.
+
+    Parameters
+    ----------
+    fitter:
+        Of the frames to fit.
+    free:
+        What the pictures say, of all frames.
+    train:
+        (N,) which of all frames are the fitter's.
+    """
+    views = fitter.views
+    poses = free.camera_from_board[train]
+    if fitter.has_robot:
+        model, hand_eye = plain_model(replace(free, camera_from_board=poses), views)
+        noise = noise_guess(free, hand_eye)
+    else:
+        model = CellModel(free.optics, np.eye(4), np.eye(4))
+        noise = Noise(max(free.sigma_px, 1e-3), *UNKNOWN_POSE)
+    fit = fitter.fit(model, noise)
+    if not fitter.has_robot or views.board.corner_count > _MOST_FREE_CORNERS:
+        return fit
+    freed = fitter.fit(fit.model, replace(fit.noise, print_m=_PRINT_GUESS_M), fit.flange_error)
+    return freed if freed.minus_two_log < fit.minus_two_log - _PRINT_WORTH else fit

@@ -97,10 +97,10 @@ def fit_free_poses(
     """
     active = tuple(COLUMN[name] for name in free)
     seen = np.isfinite(corners_px).all(axis=2)
-    weight = seen * (1.0 if weight is None else weight)
+    counted = seen.astype(np.float64) if weight is None else seen * weight
     optics, poses = optics.copy(), camera_from_board.copy()
     damping, converged, iteration = 1e-6, False, 0
-    equations, residual = _equations(optics, poses, points_m, corners_px, weight, active)
+    equations, residual = _equations(optics, poses, points_m, corners_px, counted, active)
     while iteration < max_iterations and not converged:
         iteration += 1
         reduced = eliminate(equations, np.zeros((6, 6)), damping)
@@ -111,7 +111,7 @@ def fit_free_poses(
         trial_optics[:, active] += step
         trial_poses = rigid.from_vector(own) @ poses
         trial, trial_residual = _equations(
-            trial_optics, trial_poses, points_m, corners_px, weight, active
+            trial_optics, trial_poses, points_m, corners_px, counted, active
         )
         if trial.square_sum <= equations.square_sum * (1.0 + 1e-15):
             gain = 1.0 - trial.square_sum / max(equations.square_sum, 1e-300)

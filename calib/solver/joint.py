@@ -16,8 +16,8 @@ from calib.solver.noise import JointEquations, Noise, Profile, estimate_noise, p
 from calib.solver.unknowns import Dependence, Unknown, dependence, moved
 from calib.views import FloatArray, Views
 
-STUDENT_DOF = 5.0
-"""Degrees of freedom of the corners' t distribution: tails heavier than a Gauss curve's."""
+GOOD_SIGMA = 3.0
+"""A corner within this many sigma of its place counts fully."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class JointFit:
     residual_px:
         (N, M, 2) observed minus predicted with the flange errors put in, NaN where not seen.
     weight:
-        (N, M) what the t distribution made of each corner; one for a good one.
+        (N, M) how much each corner counts; one for a good one.
     minus_two_log:
         -2 log marginal likelihood (not restricted), to compare models of the same data.
     profile, equations, dependence:
@@ -148,10 +148,14 @@ def assemble(
     return equations, local.residual_px
 
 
-def _student_weight(residual_px: FloatArray, sigma_px: float) -> FloatArray:
-    """(N, M) weights of a bivariate t distribution (Lange, Little, Taylor 1989), at most one."""
-    square = np.nansum(residual_px**2, axis=2) / sigma_px**2
-    weight = np.minimum((STUDENT_DOF + 2.0) / (STUDENT_DOF + square), 1.0)
+def _robust_weight(residual_px: FloatArray, sigma_px: float) -> FloatArray:
+    """(N, M) one up to three sigma, then falling with the fourth power of the distance.
+
+    A redescending weight (Hampel et al. 1986, section 2.6): a good corner keeps its full say, so
+    that the noise is not underestimated, and a wrong one loses it.
+    """
+    square = np.nansum(residual_px**2, axis=2) / (GOOD_SIGMA * sigma_px) ** 2
+    weight = np.where(square > 1.0, 1.0 / np.maximum(square, 1.0) ** 2, 1.0)
     return np.where(np.isfinite(residual_px).all(axis=2), weight, 0.0)
 
 
@@ -231,7 +235,7 @@ class _Iteration:
             level, _ = estimate_noise(self.equations, self.state.noise)
             self.state = replace(self.state, noise=level)
         if robust:
-            self.weight = _student_weight(self.residual, self.state.noise.corner_px)
+            self.weight = _robust_weight(self.residual, self.state.noise.corner_px)
             self.equations, self.residual = self._assemble(self.found, self.state)
 
 

@@ -1,0 +1,65 @@
+"""What these data cannot tell apart, and what would tell it."""
+
+from __future__ import annotations
+
+from calib.chain.effect import Effect
+from calib.discovery.diagnosis import Ambiguity
+from calib.discovery.search import UNDECIDED, Search
+
+_EXPERIMENTS = {
+    frozenset({"protective_window", "entrance_pupil_shift"}): (
+        "no plan of poses can: take the window off (or hold a known pane before the lens) and"
+        " record once more"
+    ),
+    frozenset({"protective_window", "distance_dependent_distortion"}): (
+        "take the window off and record once more; refocus at a fixed distance"
+    ),
+    frozenset({"entrance_pupil_shift", "distance_dependent_distortion"}): (
+        "refocus at a fixed distance: distortion follows the focus, the pupil does not"
+    ),
+    frozenset({"decentering", "sensor_tilt"}): (
+        "views with the board in the outermost corners of the image; poses alone hardly can"
+    ),
+    frozenset({"board_scale", "link_geometry"}): (
+        "no plan of poses can: measure the board with a calliper, or use a certified scale bar"
+    ),
+    frozenset({"focus_breathing", "thermal_focal_drift"}): (
+        "go through the distances twice, once outward and once back"
+    ),
+    frozenset({"pose_time_lag", "rolling_shutter"}): (
+        "move once along the image's rows and once along its columns, at the same speed"
+    ),
+    frozenset({"mount_flex", "lens_sag"}): (
+        "vary the distance at one attitude: sag shifts pixels, flex turns the view"
+    ),
+    frozenset({"mount_slip", "board_slip"}): (
+        "repeat the first poses at the end, turned by 90 degrees about the optical axis"
+    ),
+}
+_GENERAL = "more views in which the two differ: design them with `cell plan --power`"
+
+
+def experiment(first: Effect, second: Effect) -> str:
+    """What would tell the two apart, in words."""
+    return _EXPERIMENTS.get(frozenset({first.name, second.name}), _GENERAL)
+
+
+def ambiguities(search: Search) -> tuple[Ambiguity, ...]:
+    """For every effect taken in, the rivals that the data do not rule out."""
+    found = []
+    for step in search.steps:
+        for rival, behind in step.rivals:
+            if behind > UNDECIDED or rival.effect.name == step.taken.effect.name:
+                continue
+            found.append(
+                Ambiguity(
+                    names=(step.taken.effect.name, rival.effect.name),
+                    why=(
+                        f"{rival.effect.label} in place of {step.taken.effect.label} is less"
+                        f" likely by only {behind:.1f} in the Bayesian criterion"
+                        f" (below {UNDECIDED:g} is undecided)"
+                    ),
+                    experiment=experiment(step.taken.effect, rival.effect),
+                )
+            )
+    return tuple(found)

@@ -1,0 +1,1 @@
+"""Slips of the log, tried before any physics: conventions, units, pairing, the wrong arm."""

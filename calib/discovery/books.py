@@ -1,0 +1,153 @@
+"""Keeping the books: every slip of the log found and mended before physics is asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.calibration.baseline import fit_baseline
+from calib.calibration.frames import usable_frames
+from calib.calibration.result import Rejection
+from calib.chain import rigid
+from calib.discovery.bookkeeping.consistency import mounted_from_fixed
+from calib.discovery.bookkeeping.conventions import find_conventions
+from calib.discovery.bookkeeping.pairing import find_odd_frames, find_offset
+from calib.discovery.bookkeeping.recover import recover
+from calib.discovery.bookkeeping.robot_model import find_robot_model
+from calib.discovery.bookkeeping.slip import Slip
+from calib.discovery.start import FreeViews, free_views
+from calib.errors import CalibrationError
+from calib.views import BoolArray, FloatArray, Views
+
+FEWEST_FRAMES = 6
+
+
+@dataclass(frozen=True)
+class Books:
+    """A log put right.
+
+    Attributes
+    ----------
+    views:
+        The frames that can be used, slips mended, missing columns filled in.
+    log:
+        Every known row of the log, mended alike.
+    free:
+        What the pictures of `views` say without the robot.
+    slips:
+        What was mended, in order.
+    rejected:
+        Frames left out, with reasons.
+    said:
+        What was worked out rather than logged, and what could not be.
+    has_robot:
+        False where there are no poses to hold the pictures against.
+    """
+
+    views: Views
+    log: Views
+    free: FreeViews
+    slips: tuple[Slip, ...]
+    rejected: tuple[Rejection, ...]
+    said: tuple[str, ...]
+    has_robot: bool
+
+
+def keep_books(views: Views, log: Views) -> Books:
+    """Mend the log.
+
+    Parameters
+    ----------
+    views:
+        The recording's frames.
+    log:
+        Every known row of the log: the recording's and, where given, those to predict.
+
+    Raises
+    ------
+    CalibrationError
+        When the pictures themselves cannot be calibrated.
+    """
+    baseline = fit_baseline(views, usable_frames(views))
+    free = free_views(baseline, views.height_px)
+    loop = mounted_from_fixed(free.camera_from_board, views.mount)
+    rejected = list(baseline.rejected)
+    good = np.asarray(np.isfinite(free.camera_from_board).all(axis=(1, 2)))
+    recovered = recover(views, log)
+    views, log, said = recovered.views, recover(log, log).views, list(recovered.said)
+    if int((views.has_pose & good).sum()) < FEWEST_FRAMES:
+        said.append("no robot poses: what a free camera pose can absorb cannot be seen")
+        views = _without_robot(views, free)
+        return _books(views, log, free, [], rejected, said, False, good)
+    slips: list[Slip] = []
+    views, log, loop_slips = _mend_conventions(views, log, loop)
+    slips += loop_slips
+    for find in (_offset, _robot_model):
+        slip = find(views, log, loop)
+        if slip is not None:
+            slips.append(slip)
+            views, log = slip.mend(views, log), slip.mend(log, log)
+    odd = find_odd_frames(views, loop)
+    if odd.swap is not None:
+        slips.append(odd.swap)
+        views, log = odd.swap.mend(views, log), odd.swap.mend(log, log)
+    rejected += [Rejection(f, "its pose belongs to no picture") for f in odd.dropped]
+    rejected += [
+        Rejection(int(f), "no flange pose")
+        for f, has in zip(views.frame, views.has_pose, strict=True)
+        if not has
+    ]
+    kept = good & views.has_pose & ~np.isin(views.frame, odd.dropped)
+    if kept.sum() < FEWEST_FRAMES:
+        raise CalibrationError(
+            f"only {int(kept.sum())} frames have a board and a flange pose that belong together;"
+            f" a diagnosis needs {FEWEST_FRAMES}"
+        )
+    return _books(views, log, free, slips, rejected, said, True, kept)
+
+
+def _offset(views: Views, log: Views, loop: FloatArray) -> Slip | None:
+    return find_offset(views, log, loop)
+
+
+def _robot_model(views: Views, log: Views, loop: FloatArray) -> Slip | None:
+    return find_robot_model(views, loop)
+
+
+def _mend_conventions(
+    views: Views, log: Views, loop: FloatArray
+) -> tuple[Views, Views, list[Slip]]:
+    found = find_conventions(views, loop)
+    for slip in found.slips:
+        views, log = slip.mend(views, log), slip.mend(log, log)
+    return views, log, list(found.slips)
+
+
+def _without_robot(views: Views, free: FreeViews) -> Views:
+    """Poses that the pictures themselves give, so that the robot's noise absorbs every pose."""
+    pose = free.camera_from_board
+    flange = rigid.inverse(pose) if views.mount == "eye_in_hand" else pose
+    return replace(views, base_from_flange=flange, robot_model=None)
+
+
+def _books(
+    views: Views,
+    log: Views,
+    free: FreeViews,
+    slips: list[Slip],
+    rejected: list[Rejection],
+    said: list[str],
+    has_robot: bool,
+    kept: BoolArray,
+) -> Books:
+    kept_free = replace(free, camera_from_board=free.camera_from_board[kept])
+    return Books(
+        views.take(np.flatnonzero(kept)),
+        log,
+        kept_free,
+        tuple(slips),
+        tuple(rejected),
+        tuple(said),
+        has_robot,
+    )

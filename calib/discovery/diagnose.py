@@ -1,0 +1,239 @@
+"""From a recording to a diagnosis: locate, name, model, prove."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from calib.chain.effect import Present
+from calib.chain.effects import catalogue
+from calib.discovery.ambiguity import ambiguities
+from calib.discovery.bookkeeping.slip import Slip
+from calib.discovery.books import Books, keep_books
+from calib.discovery.candidates import unseen
+from calib.discovery.diagnosis import (
+    Diagnosis,
+    Mismatch,
+    NamedEffect,
+    Unexplained,
+    Value,
+    Verdict,
+)
+from calib.discovery.leftover import Leftover, look_for_leftover
+from calib.discovery.locate import Cell, locate
+from calib.discovery.prove import held_out, prediction_rms_px, prove
+from calib.discovery.score import pose_numbers
+from calib.discovery.search import Search
+from calib.discovery.start import Fitter, fit_start
+from calib.solver.joint import JointFit
+from calib.solver.noise import Noise
+from calib.views import Views
+
+_MISMATCHES_TOLD = 8
+_WORTH_TELLING = 1e-3
+
+
+def diagnose(
+    views: Views, *, log: Views | None = None, forced: Sequence[Present] | None = None
+) -> Diagnosis:
+    """Diagnose a recording.
+
+    Parameters
+    ----------
+    views:
+        Its frames.
+    log:
+        Further rows of the robot's log (frames to predict), among which a frame's true pose may
+        stand when rows were mixed up.
+    forced:
+        Effects to take as they are named, in place of the search.
+
+    Raises
+    ------
+    CalibrationError
+        When the recording cannot even be calibrated.
+    """
+    books = keep_books(views, views if log is None else log)
+    held = held_out(len(books.views))
+    fitter = Fitter(books.views.take(~held), books.has_robot)
+    before = fit_start(fitter, books.free, ~held)
+    search = Search(before, fitter)
+    if forced is None:
+        search.run()
+        leftover = look_for_leftover(search)
+    else:
+        search.force(forced)
+        leftover = Leftover(search, ())
+    return _told(books, held, before, leftover)
+
+
+@dataclass(frozen=True)
+class _Fits:
+    """The plain cell and the final one: fitted without the held-out frames, and to all."""
+
+    before: JointFit
+    after: JointFit
+    twin: JointFit
+    plain: JointFit
+
+
+def _told(books: Books, held: np.ndarray, before: JointFit, leftover: Leftover) -> Diagnosis:  # type: ignore[type-arg]
+    search = leftover.search
+    after = search.best.fit
+    everything = Fitter(books.views, books.has_robot)
+    twin = everything.with_effects(_restarted(after, len(books.views), held), after.model.effects)
+    plain = everything.fit(before.model, before.noise)
+    fits = _Fits(before, after, twin, plain)
+    held_views = books.views.take(held)
+    proof = prove(before, after, held_views)
+    named = tuple(_slip(slip) for slip in books.slips) + _named(fits, held_views, search.fitter)
+    return Diagnosis(
+        verdict=_verdict(named, leftover),
+        effects=named,
+        ambiguous_with=ambiguities(search),
+        unexplained=_unexplained(leftover),
+        mismatch=_mismatches(fits, everything),
+        proof=proof,
+        before=plain.model,
+        twin=twin.model,
+        noise=twin.noise,
+        views=books.views,
+        log=books.log,
+        rejected=books.rejected,
+        said=(*books.said, *_unseen(books.views)),
+        fit=twin,
+    )
+
+
+def _restarted(fit: JointFit, frames: int, held: np.ndarray) -> JointFit:  # type: ignore[type-arg]
+    """The fit with room for the frames that were held out."""
+    error = np.zeros((frames, 6))
+    error[~held] = fit.flange_error
+    return replace(fit, flange_error=error)
+
+
+def _verdict(named: Sequence[NamedEffect], leftover: Leftover) -> Verdict:
+    if leftover.cells:
+        return "unexplained"
+    return "explained" if named else "consistent"
+
+
+def _slip(slip: Slip) -> NamedEffect:
+    return NamedEffect(
+        name=slip.name,
+        link="bookkeeping",
+        law=None,
+        physics=slip.physics,
+        remedy=slip.remedy,
+        parameters={k: Value(v, 0.0, unit) for k, (v, unit) in slip.parameters.items()},
+        p_value=0.0,
+        holdout_gain_px=0.0,
+    )
+
+
+def _named(fits: _Fits, held: Views, fitter: Fitter) -> tuple[NamedEffect, ...]:
+    """Every named effect of the final cell, with what its absence would cost."""
+    named = []
+    effects = fits.after.model.effects
+    for index, present in enumerate(effects):
+        if present.effect.name == "empirical":
+            continue
+        rest = effects[:index] + effects[index + 1 :]
+        without = fitter.with_effects(fits.after, rest)
+        gain = without.minus_two_log - fits.after.minus_two_log
+        columns = fits.after.parameters - without.parameters
+        lost = float("nan")
+        if len(held):
+            lost = prediction_rms_px(without.model, held) - prediction_rms_px(
+                fits.after.model, held
+            )
+        effect = present.effect
+        named.append(
+            NamedEffect(
+                name=effect.name,
+                link=effect.link,
+                law=effect.law,
+                physics=effect.physics,
+                remedy=effect.remedy,
+                parameters=_values(fits.twin, index),
+                p_value=float(chi2.sf(max(gain, 0.0), max(columns, 1))),
+                holdout_gain_px=lost,
+            )
+        )
+    return tuple(named)
+
+
+def _values(twin: JointFit, index: int) -> dict[str, Value]:
+    present = twin.model.effects[index]
+    sigma = {
+        u.place[2]: float(np.sqrt(twin.covariance[k, k]))
+        for k, u in enumerate(twin.unknowns)
+        if u.place[0] == "effect" and u.place[1] == index
+    }
+    return {
+        p.name: Value(float(v), sigma.get(k, 0.0), p.unit)
+        for k, (p, v) in enumerate(zip(present.effect.parameters, present.values, strict=True))
+        if p.role != "amount" or p.identifiable
+    }
+
+
+def _unexplained(leftover: Leftover) -> Unexplained | None:
+    if not leftover.cells:
+        return None
+    cell = leftover.cells[0]
+    return Unexplained(cell.link, cell.site, cell.covariate, cell.where, cell.p_value)
+
+
+def _mismatches(fits: _Fits, fitter: Fitter) -> tuple[Mismatch, ...]:
+    """Where the plain cell misses, judged by the noise that the final cell leaves."""
+    judged = replace(fits.plain, noise=_judge(fits.plain.noise, fits.twin.noise))
+    cells = [c for c in locate(judged, fitter.views) if c.p_value < _WORTH_TELLING]
+    excess = _excess(judged, fitter.views)
+    told: list[Cell] = []
+    for cell in sorted(cells, key=lambda c: -c.score.gain):
+        if all((cell.site, cell.covariate) != (t.site, t.covariate) for t in told):
+            told.append(cell)
+    return tuple(
+        Mismatch(
+            link=c.link,
+            site=c.site,
+            covariate=c.covariate,
+            where=c.where,
+            share_of_excess=min(1.0, c.score.gain / excess),
+            p_value=c.p_value,
+        )
+        for c in told[:_MISMATCHES_TOLD]
+    )
+
+
+def _judge(before: Noise, after: Noise) -> Noise:
+    return Noise(
+        min(before.corner_px, after.corner_px),
+        min(before.flange_m, after.flange_m),
+        min(before.flange_rad, after.flange_rad),
+        after.print_m if before.print_m > 0.0 else 0.0,
+    )
+
+
+def _excess(fit: JointFit, views: Views) -> float:
+    """Squared misfit, in units of the noise, above what noise alone makes."""
+    pull = fit.flange_error @ fit.noise.flange_information
+    square = float(np.sum(pull * fit.flange_error))
+    residual = np.nansum(fit.residual_px**2, axis=2) * fit.weight / fit.noise.corner_px**2
+    freedom = 2 * int((fit.weight > 0).sum()) - pose_numbers(views)
+    return max(square + float(residual.sum()) - freedom, 1.0)
+
+
+def _unseen(views: Views) -> tuple[str, ...]:
+    reasons: dict[str, list[str]] = {}
+    for name, why in unseen(views).items():
+        reasons.setdefault(why, []).append(name)
+    return tuple(f"could not be seen ({why}): {', '.join(n)}" for why, n in reasons.items())
+
+
+def known_names() -> tuple[str, ...]:
+    """Names of the catalogue, for messages."""
+    return tuple(sorted({effect.name for effect in catalogue()}))

@@ -1,0 +1,106 @@
+"""What a diagnosis says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from calib.calibration.result import Rejection
+from calib.chain.model import CellModel
+from calib.discovery.prove import Proof
+from calib.solver.joint import JointFit
+from calib.solver.noise import Noise
+from calib.views import Views
+
+Verdict = Literal["consistent", "explained", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number with its one-sigma uncertainty and unit."""
+
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """Where the misfit of the plain cell lives."""
+
+    link: str
+    site: str
+    covariate: str
+    where: str
+    share_of_excess: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """One piece of physics, or slip of the log, that the recording demands."""
+
+    name: str
+    link: str
+    law: str | None
+    physics: str
+    remedy: str
+    parameters: dict[str, Value]
+    p_value: float
+    holdout_gain_px: float
+
+
+@dataclass(frozen=True)
+class Ambiguity:
+    """Names that these data cannot tell apart, why, and what would."""
+
+    names: tuple[str, ...]
+    why: str
+    experiment: str
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Something real that no known effect accounts for: where it lives."""
+
+    link: str
+    site: str
+    covariate: str
+    where: str
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The whole answer.
+
+    Attributes
+    ----------
+    verdict, effects, ambiguous_with, unexplained, mismatch, proof:
+        As in the contract's diagnosis.json.
+    before, twin:
+        The plain cell and the cell with all that was found, fitted to every usable frame.
+    noise:
+        Noise levels of the twin.
+    views, log:
+        The mended frames that were used, and every mended row of the log.
+    rejected, said:
+        Frames left out; what was worked out, filled in, or could not be seen.
+    fit:
+        The twin's joint fit, for the report.
+    """
+
+    verdict: Verdict
+    effects: tuple[NamedEffect, ...]
+    ambiguous_with: tuple[Ambiguity, ...]
+    unexplained: Unexplained | None
+    mismatch: tuple[Mismatch, ...]
+    proof: Proof | None
+    before: CellModel
+    twin: CellModel
+    noise: Noise
+    views: Views
+    log: Views
+    rejected: tuple[Rejection, ...]
+    said: tuple[str, ...]
+    fit: JointFit

@@ -1,0 +1,64 @@
+"""What is left when the known physics has been put in: nothing, or something without a name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from calib.chain.empirical import present_curve
+from calib.chain.model import walk
+from calib.discovery.locate import Cell, locate
+from calib.discovery.search import Search
+from calib.views import Views
+
+ALARM = 2e-3
+"""Chance of a false alarm over all cells that are tested."""
+
+_LAW_SHARE = 0.03
+"""A remainder in the link of a named effect that is this small a part of it is its law's shape."""
+
+_MOST_CURVES = 3
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """The search with unnamed curves put in where they were needed, and the cells that asked."""
+
+    search: Search
+    cells: tuple[Cell, ...]
+
+
+def alarm(cells: list[Cell]) -> Cell | None:
+    """The most significant cell, if it is more than chance among all those tested."""
+    if not cells:
+        return None
+    return cells[0] if cells[0].p_value * len(cells) < ALARM else None
+
+
+def is_shape_of_law(cell: Cell, search: Search) -> bool:
+    """Whether the remainder is but a small part of an effect that is named in the same link."""
+    named = [s for s in search.steps if s.taken.effect.link == cell.link]
+    return any(cell.score.gain < _LAW_SHARE * step.demand for step in named)
+
+
+def look_for_leftover(search: Search) -> Leftover:
+    """Test what is left; carry it by unnamed curves and see which names are still needed then."""
+    found: list[Cell] = []
+    views = search.views
+    for _ in range(_MOST_CURVES):
+        fit = search.best.fit
+        cell = alarm(locate(fit, views))
+        if cell is None or is_shape_of_law(cell, search):
+            break
+        found.append(cell)
+        if cell.curve is None or not _carry(search, cell, views):
+            break
+    return Leftover(search, tuple(found))
+
+
+def _carry(search: Search, cell: Cell, views: Views) -> bool:
+    assert cell.curve is not None
+    state = walk(search.best.fit.model, views)
+    if not search.put_in(present_curve(cell.curve, state), choices=cell.tried):
+        return False
+    search.run()
+    return True
