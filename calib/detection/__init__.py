@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.detection.charuco import find_charuco
 from calib.detection.finder import find_chessboard
 from calib.detection.orientation import orient, turned_order, turns_to_agree
 from calib.detection.result import Detection, Rejected
+from calib.detection.summary import as_detection, saturated_share
 from calib.views import Board
 
 __all__ = ["Detection", "Rejected", "detect", "orient", "turned_order", "turns_to_agree"]
@@ -33,5 +35,11 @@ def detect(image: NDArray[Any], board: Board) -> Detection | Rejected:
     grey = np.asarray(image)
     if grey.ndim == 3:
         grey = grey.mean(axis=2, dtype=np.float32)
+    grey = np.ascontiguousarray(grey, dtype=np.float32)
+    find = find_charuco if board.kind == "charuco" else find_chessboard
+    found = find(grey, board)
+    if isinstance(found, Rejected):
+        return found
     limit = np.iinfo(image.dtype).max if np.issubdtype(image.dtype, np.integer) else np.inf
-    return find_chessboard(np.ascontiguousarray(grey, dtype=np.float32), board, float(limit))
+    fitted, unseen = found
+    return as_detection(fitted, unseen, board, saturated_share(grey, fitted, float(limit)))

@@ -12,8 +12,8 @@ from calib.detection.candidates import find_candidates
 from calib.detection.grid import Grid, in_board_order, place_board, with_predictions
 from calib.detection.lattice import grow_lattices
 from calib.detection.refine import Fitted, doubtful, fit_closely, fit_grid, starts
-from calib.detection.result import Detection, FloatArray, Rejected
-from calib.detection.saddle import CONTRAST, PIXEL_VARIANCE, WIDTH, X, Y
+from calib.detection.result import FloatArray, Rejected
+from calib.detection.saddle import PIXEL_VARIANCE, WIDTH, X, Y
 from calib.views import Board
 
 FloatImage = NDArray[np.float32]
@@ -88,35 +88,8 @@ def _found(image: FloatImage, board: Board) -> Iterator[tuple[float, Grid, Fitte
         yield found if isinstance(found, Rejected) else (scale, *found)
 
 
-def _saturated_share(image: FloatImage, fitted: Fitted, limit: float) -> float:
-    corners = fitted.corners_px
-    outline = np.array([corners[0, 0], corners[0, -1], corners[-1, -1], corners[-1, 0]])
-    low = np.clip(np.floor(outline.min(axis=0)).astype(int), 0, None)
-    high = np.ceil(outline.max(axis=0)).astype(int) + 1
-    part = image[low[1] : high[1], low[0] : high[0]]
-    mask = np.zeros(part.shape, np.uint8)
-    cv2.fillConvexPoly(mask, np.rint(outline - low).astype(np.int32), 1)
-    middle = float(np.median(fitted.parameters[..., CONTRAST + 1]))
-    bright = part[(mask > 0) & (part > middle)]
-    return float((bright >= limit).mean()) if bright.size else 0.0
-
-
-def _as_detection(fitted: Fitted, board: Board, saturated: float) -> Detection:
-    M = board.corner_count
-    covariance = fitted.covariance_px2.reshape(M, 2, 2)
-    return Detection(
-        corners_px=fitted.corners_px.reshape(M, 2),
-        covariance_px2=covariance,
-        sigma_px=np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2),
-        blur_px=fitted.blur_px.reshape(M),
-        contrast=2 * np.abs(fitted.parameters[..., CONTRAST]).reshape(M),
-        upside_down_known=(board.rows + board.cols) % 2 == 1,
-        saturated=saturated,
-    )
-
-
-def find_chessboard(image: FloatImage, board: Board, limit: float) -> Detection | Rejected:
-    """All inner corners of a chessboard, or why they were not found.
+def find_chessboard(image: FloatImage, board: Board) -> tuple[Fitted, NDArray[np.bool_]] | Rejected:
+    """All inner corners of a chessboard (none unseen), or why they were not found.
 
     Parameters
     ----------
@@ -124,8 +97,6 @@ def find_chessboard(image: FloatImage, board: Board, limit: float) -> Detection 
         (h, w) grey levels.
     board:
         What to look for.
-    limit:
-        Grey level at which the sensor saturates.
     """
     best: Rejected | None = None
     for found in _found(image, board):
@@ -141,5 +112,5 @@ def find_chessboard(image: FloatImage, board: Board, limit: float) -> Detection 
                 f"{int(doubt.sum())} of {doubt.size} corners are unclear when looked at closely"
             )
             continue
-        return _as_detection(fine, board, _saturated_share(image, fine, limit))
+        return fine, doubt
     return best or Rejected("the picture is too small")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from calib.detection.result import FloatArray
 from calib.detection.saddle import (
     ANGLE_1,
+    ANGLE_2,
     CONTRAST,
     MEAN,
     PARAMETERS,
@@ -51,6 +52,13 @@ class Fitted:
         return self.parameters[..., [X, Y]]
 
     @property
+    def first_dark_contrast(self) -> FloatArray:
+        """(rows, cols) contrast, positive everywhere if the square outside (0, 0) is dark."""
+        rows, cols = self.residual.shape
+        odd = np.add.outer(np.arange(rows), np.arange(cols)) % 2
+        return np.asarray(self.parameters[..., CONTRAST] * (1 - 2 * odd))
+
+    @property
     def blur_px(self) -> FloatArray:
         """(rows, cols) Gaussian blur without the pixel's own."""
         width = self.parameters[..., WIDTH]
@@ -75,19 +83,29 @@ def _sampled(image: NDArray[np.float32], xy: FloatArray) -> FloatArray:
     return np.asarray(image[y, x], dtype=np.float64)
 
 
-def starts(image: NDArray[np.float32], corners_px: FloatArray) -> FloatArray:
-    """(rows, cols, 7) first guesses: edges along the lattice, levels from the squares' middles."""
+def edge_angles(corners_px: FloatArray) -> FloatArray:
+    """(rows, cols, 2) directions of the lattice's two lines at each corner, radians."""
+    steps = lattice_steps(corners_px)
+    return np.arctan2(steps[..., 1::2], steps[..., 0::2])
+
+
+def starts(
+    image: NDArray[np.float32], corners_px: FloatArray, *, aside: float = 0.35
+) -> FloatArray:
+    """(rows, cols, 7) first guesses: edges along the lattice, levels from the squares.
+
+    The levels are read `aside` of the corner, as a share of the steps in both directions.
+    """
     steps = lattice_steps(corners_px)
     across, down = steps[..., :2], steps[..., 2:]
     quarters = [
-        (a, b, _sampled(image, corners_px + 0.35 * (a * across + b * down)))
+        (a, b, _sampled(image, corners_px + aside * (a * across + b * down)))
         for a in (-1, 1)
         for b in (-1, 1)
     ]
     guess = np.empty((*corners_px.shape[:2], PARAMETERS))
     guess[..., [X, Y]] = corners_px
-    guess[..., ANGLE_1] = np.arctan2(across[..., 1], across[..., 0])
-    guess[..., ANGLE_1 + 1] = np.arctan2(down[..., 1], down[..., 0])
+    guess[..., [ANGLE_1, ANGLE_2]] = edge_angles(corners_px)
     guess[..., WIDTH] = np.maximum(0.06 * _shortest_step(steps), 0.8)
     guess[..., MEAN] = sum(level for _, _, level in quarters) / 4
     # d1 > 0 below edge 1 and d2 > 0 left of edge 2: their product is negative in square (+, +)
@@ -242,12 +260,9 @@ def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray
     first_dark:
         Whether the square outside corner (0, 0) is dark.
     """
-    rows, cols = before_px.shape[:2]
-    steps = lattice_steps(before_px)
-    shortest = _shortest_step(steps)
+    shortest = _shortest_step(lattice_steps(before_px))
     moved = np.linalg.norm(fitted.corners_px - before_px, axis=-1)
-    even = np.add.outer(np.arange(rows), np.arange(cols)) % 2 == 0
-    contrast = fitted.parameters[..., CONTRAST] * np.where(even == first_dark, 1.0, -1.0)
+    contrast = fitted.first_dark_contrast * (1.0 if first_dark else -1.0)
     typical = float(np.nanmedian(np.abs(contrast)))
     fine = (
         np.isfinite(fitted.residual)
