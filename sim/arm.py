@@ -84,8 +84,8 @@ class SimArm:
         Which arm, and the time it lives in.
     home_rad:
         (6,) joint angles it stands at first.
-    repeatability, seed:
-        How it scatters.
+    repeatability, rng:
+        How it scatters, and by which random numbers.
     """
 
     tried_on_hardware = False
@@ -97,14 +97,14 @@ class SimArm:
         home_rad: FloatArray,
         *,
         repeatability: Repeatability | None = None,
-        seed: int = 0,
+        rng: np.random.Generator | None = None,
     ) -> None:
         self.faults = ArmFaults()
         self.moves_made = 0
         self._kinematics = kinematics
         self._clock = clock
         self._repeatability = repeatability or Repeatability()
-        self._rng = np.random.default_rng(seed)
+        self._rng = rng or np.random.default_rng(0)
         self._lock = threading.RLock()
         self._connected = False
         self._fault: str | None = None

@@ -10,7 +10,7 @@ from sim.render.pattern import pattern_of
 from sim.render.sensor import Sensor, expose
 from sim.render.surface import Image, Surface, look
 
-__all__ = ["Blur", "Sensor", "expose", "render"]
+__all__ = ["Blur", "Image", "Sensor", "expose", "render"]
 
 
 def render(

@@ -17,17 +17,17 @@ class Sensor:
     Attributes
     ----------
     full_well_e:
-        Electrons at which a pixel reads 255 at 0 dB.
-    read_noise_e:
-        Standard deviation of the readout, electrons.
+        Electrons at which a pixel reads 255 at 0 dB; None for light without photon noise.
+    read_noise_levels:
+        Standard deviation of the readout in levels of the 8-bit image at 0 dB.
     white_exposure_s:
-        Exposure at which a perfectly white board fills the well in the image's centre.
+        Exposure at which a perfectly white board reads 255 in the image's centre at 0 dB.
     falloff, gradient_x, gradient_y:
         Relative loss of light in the image's corner, and change from edge to edge.
     """
 
-    full_well_e: float = 10_000.0
-    read_noise_e: float = 8.0
+    full_well_e: float | None = 10_000.0
+    read_noise_levels: float = 0.5
     white_exposure_s: float = 0.012
     falloff: float = 0.12
     gradient_x: float = 0.06
@@ -47,13 +47,20 @@ def expose(
     Photon noise has the variance of the electrons counted (Poisson's, taken as normal: dark
     toner alone still gives hundreds of electrons), read noise adds; no noise where `rng` is None.
     """
-    electrons = reflectance * _lamp(reflectance.shape, sensor)
-    electrons *= np.float32(sensor.full_well_e * exposure_s / sensor.white_exposure_s)
+    levels = reflectance * _lamp(reflectance.shape, sensor)
+    levels *= np.float32(255.0 * exposure_s / sensor.white_exposure_s)
     if rng is not None:
-        spread = np.sqrt(electrons + np.float32(sensor.read_noise_e**2))
-        electrons += spread * rng.standard_normal(electrons.shape, np.float32)
-    counts = electrons * np.float32(255.0 / sensor.full_well_e * 10.0 ** (gain_db / 20.0))
-    return np.asarray(np.clip(np.rint(counts), 0, 255), np.uint8)
+        levels += _spread(levels, sensor) * rng.standard_normal(levels.shape, np.float32)
+    levels *= np.float32(10.0 ** (gain_db / 20.0))
+    return np.asarray(np.clip(np.rint(levels), 0, 255), np.uint8)
+
+
+def _spread(levels: Image, sensor: Sensor) -> Image:
+    """Standard deviation of each pixel, levels."""
+    read = np.float32(sensor.read_noise_levels**2)
+    if sensor.full_well_e is None:
+        return np.full_like(levels, np.sqrt(read))
+    return np.asarray(np.sqrt(levels * np.float32(255.0 / sensor.full_well_e) + read))
 
 
 def _lamp(shape: tuple[int, ...], sensor: Sensor) -> Image:

@@ -167,7 +167,7 @@ def test_without_connecting_nothing_answers():
 
 def test_it_scatters_anew_with_every_move_as_much_as_asked():
     scatter = Repeatability(position_m=3e-5, rotation_rad=2e-5)
-    robot, clock = ready(repeatability=scatter, seed=5)
+    robot, clock = ready(repeatability=scatter, rng=np.random.default_rng(5))
     errors = []
     for k in range(300):
         robot.start_move(MoveTarget(joints_rad=tuple(HOME + 0.01 * (k % 2 + 1))))

@@ -196,14 +196,14 @@ def test_opencv_finds_its_own_charuco_board():
 
 
 def test_noise_is_that_of_photons_and_readout():
-    sensor = Sensor(full_well_e=8000, read_noise_e=10, falloff=0, gradient_x=0, gradient_y=0)
+    sensor = Sensor(full_well_e=8000, read_noise_levels=0.5, falloff=0, gradient_x=0, gradient_y=0)
     even = np.full((400, 500), 0.5, np.float32)
     picture = expose(
         even, sensor, exposure_s=sensor.white_exposure_s, rng=np.random.default_rng(1)
     ).astype(float)
     assert picture.mean() == pytest.approx(127.5, abs=0.1)
     per_count = 8000 / 255
-    expected = np.sqrt((4000 + 100) / per_count**2 + 1 / 12)
+    expected = np.sqrt(4000 / per_count**2 + 0.5**2 + 1 / 12)
     assert picture.std() == pytest.approx(expected, rel=0.02)
 
 

@@ -1,0 +1,252 @@
+"""A simulated camera: it renders what the arm's true pose shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from calib.chain import rigid
+from calib.chain.model import CellModel, walk
+from calib.chain.walk import Walk
+from calib.views import FloatArray, Views
+from drivers.camera import FocusSetting, Frame
+from drivers.errors import DeviceRefused, DeviceUnreachable, FrameLost
+from sim.arm import ArmTruth
+from sim.cell import SENSOR_STREAM, SimulatedCell
+from sim.clock import Clock
+from sim.log import Row, temperature_c, views_of
+from sim.render import Blur, Image, expose, render
+
+READOUT_S = 0.02
+FOCUSING_S = 0.3
+_EXPOSURE_RANGE_S = (1e-5, 1.0)
+_GAIN_RANGE_DB = (0.0, 24.0)
+
+
+class KnowsItsTruth(Protocol):
+    """An arm that tells the world where it is; `SimArm` does."""
+
+    def truth(self) -> ArmTruth:
+        """Joints now, and by how much the flange misses the reported pose."""
+
+
+@dataclass
+class CameraFaults:
+    """What tests and demonstrations let go wrong.
+
+    Attributes
+    ----------
+    lose_frames:
+        So many of the next triggers bring no frame.
+    dead:
+        Every call raises `DeviceUnreachable`.
+    """
+
+    lose_frames: int = 0
+    dead: bool = False
+
+
+class SimCamera:
+    """A camera in this process; see `drivers.camera.Camera`.
+
+    Parameters
+    ----------
+    cell:
+        The truth it shows.
+    arm:
+        Whose flange it rides on, or whose flange carries the board.
+    clock:
+        The time it shares with the arm.
+    """
+
+    tried_on_hardware = False
+
+    def __init__(self, cell: SimulatedCell, arm: KnowsItsTruth, clock: Clock) -> None:
+        self.faults = CameraFaults()
+        self._cell, self._arm, self._clock = cell, arm, clock
+        self._rng = cell.random(SENSOR_STREAM)
+        self._connected_s: float | None = None
+        self._exposure_s = 0.8 * cell.camera.sensor.white_exposure_s
+        self._gain_db = 0.0
+        self._focus_distance_m = cell.camera.focus_distance_m
+        self._rows: list[Row] = []
+        self._errors: list[FloatArray] = []
+
+    # -- the protocol ------------------------------------------------------------------------
+
+    def connect(self) -> None:
+        """Open; a lens without a set focus is focused on the board as it stands."""
+        self._check_alive(connected=True)
+        if self._connected_s is None:
+            self._connected_s = self._clock.now()
+        if self._focus_distance_m is None:
+            self._focus_distance_m = self._distance_m()
+
+    def configure(
+        self, *, exposure_s: float | None = None, gain_db: float | None = None
+    ) -> Mapping[str, float]:
+        """Set exposure and gain; raises `DeviceRefused` outside their ranges."""
+        self._check_alive(self._connected_s is not None)
+        if exposure_s is not None:
+            self._exposure_s = _within("exposure_s", exposure_s, _EXPOSURE_RANGE_S)
+        if gain_db is not None:
+            self._gain_db = _within("gain_db", gain_db, _GAIN_RANGE_DB)
+        return {"exposure_s": self._exposure_s, "gain_db": self._gain_db}
+
+    def focus(self, setting: FocusSetting) -> float | None:
+        """Focus and wait; returns the drive's step, None for a lens without a drive.
+
+        Raises
+        ------
+        DeviceRefused
+            A lens without a drive is asked to move, or a step lies outside the drive's range.
+        """
+        self._check_alive(self._connected_s is not None)
+        spec = self._cell.camera
+        if setting.mode != "hold":
+            if spec.focus not in ("auto", "motorised"):
+                raise DeviceRefused(
+                    f"simulated camera: its lens is {spec.focus} and cannot focus by itself; "
+                    "use focus: hold in the plan"
+                )
+            self._clock.sleep(FOCUSING_S)
+            self._focus_distance_m = self._focused(setting)
+        return self._focus_position()
+
+    def grab(self, timeout_s: float) -> Frame:
+        """Expose and render; raises `FrameLost` where that was asked for."""
+        self._check_alive(self._connected_s is not None)
+        if self.faults.lose_frames > 0:
+            self.faults.lose_frames -= 1
+            self._clock.sleep(timeout_s)
+            raise FrameLost(f"simulated camera: no frame within {timeout_s} s")
+        self._clock.sleep(0.5 * self._exposure_s)
+        middle_s = self._clock.now()
+        self._note(middle_s)
+        reflectance = self._picture(*self._look())
+        self._clock.sleep(0.5 * self._exposure_s + READOUT_S)
+        return self._frame(reflectance, middle_s)
+
+    def close(self) -> None:
+        """Let go."""
+        self._connected_s = None
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _focused(self, setting: FocusSetting) -> float:
+        if setting.mode == "auto":
+            return self._distance_m()
+        if setting.mode != "position" or setting.position is None:
+            raise DeviceRefused(
+                f"simulated camera: cannot focus by mode {setting.mode!r} at {setting.position}; "
+                "it knows hold, auto, and position with a step"
+            )
+        spec = self._cell.camera
+        steps = _within("focus position", setting.position, (0.0, float(spec.focus_steps)))
+        return spec.nearest_focus_m / max(1.0 - steps / spec.focus_steps, 1e-6)
+
+    def _focus_position(self) -> float | None:
+        spec = self._cell.camera
+        if spec.focus not in ("auto", "motorised") or self._focus_distance_m is None:
+            return None
+        share = 1.0 - spec.nearest_focus_m / self._focus_distance_m
+        return float(np.clip(round(spec.focus_steps * share), 0, spec.focus_steps))
+
+    def _distance_m(self) -> float:
+        """Depth of the board's centre as the arm stands now."""
+        truth = self._arm.truth()
+        row = self._row(truth, self._clock.now())
+        views = views_of(self._cell, [*self._rows, row])
+        errors = np.array([*self._errors, truth.flange_error])
+        return float(walk(self._cell.model, views, flange_error=errors).distance_m[-1])
+
+    def _row(self, truth: ArmTruth, t_s: float) -> Row:
+        return Row(
+            t_s - (self._connected_s or 0.0),
+            truth.joints_rad,
+            truth.joint_velocity_rad_s,
+            truth.approach_joints_rad,
+            self._exposure_s,
+        )
+
+    def _note(self, t_s: float) -> None:
+        """Effects with a memory need to know every frame before this one."""
+        truth = self._arm.truth()
+        self._rows.append(self._row(truth, t_s))
+        self._errors.append(truth.flange_error)
+
+    def _look(self) -> tuple[Walk, FloatArray]:
+        views = views_of(self._cell, self._rows)
+        errors = np.array(self._errors)
+        state = walk(self._cell.model, views, flange_error=errors)
+        focus = self._focus_distance_m
+        if focus is None or abs(focus - state.distance_m[-1]) < 1e-6:
+            return state, state.optics[-1]
+        return state, optics_focused_at(self._cell.model, views, state, focus)
+
+    def _picture(self, state: Walk, optics: FloatArray) -> Image:
+        spec = self._cell.camera
+        focus = self._focus_distance_m or float(state.distance_m[-1])
+        return render(
+            self._cell.board,
+            state.points_m,
+            optics,
+            state.camera_from_board[-1],
+            width_px=spec.width_px,
+            height_px=spec.height_px,
+            blur=Blur(spec.aperture_m, focus, spec.lens_sigma_px),
+        )
+
+    def _frame(self, reflectance: Image, middle_s: float) -> Frame:
+        image = expose(
+            reflectance,
+            self._cell.camera.sensor,
+            exposure_s=self._exposure_s,
+            gain_db=self._gain_db,
+            rng=self._rng,
+        )
+        since_connect_s = middle_s - (self._connected_s or 0.0)
+        return Frame(
+            image=image,
+            host_t_s=middle_s,
+            device_t_s=since_connect_s,
+            exposure_s=self._exposure_s,
+            gain_db=self._gain_db,
+            focus_position=self._focus_position(),
+            focus_distance_m=self._focus_distance_m,
+            temperature_c=float(temperature_c(since_connect_s)),
+        )
+
+    def _check_alive(self, connected: bool) -> None:
+        if self.faults.dead:
+            raise DeviceUnreachable("simulated camera: it does not answer")
+        if not connected:
+            raise DeviceUnreachable("simulated camera: not connected; call connect() first")
+
+
+def optics_focused_at(
+    model: CellModel, views: Views, state: Walk, focus_distance_m: float
+) -> FloatArray:
+    """(K,) optics of the last frame with the lens focused elsewhere than on the board.
+
+    The chain's lens focuses on the board's centre; so the board is put where the lens is focused
+    and the chain is asked again.
+    """
+    shift = np.eye(4)
+    shift[2, 3] = focus_distance_m - state.distance_m[-1]
+    base_from_board = state.base_from_camera[-1] @ shift @ state.camera_from_board[-1]
+    if state.in_hand:
+        moved = replace(model, base_from_fixed=base_from_board)
+    else:
+        flange_from_base = rigid.inverse(state.base_from_flange[-1])
+        moved = replace(model, flange_from_mounted=flange_from_base @ base_from_board)
+    return np.asarray(walk(moved, views).optics[-1])
+
+
+def _within(name: str, value: float, bounds: tuple[float, float]) -> float:
+    if not bounds[0] <= value <= bounds[1]:
+        raise DeviceRefused(f"simulated camera: {name} {value} is outside {bounds[0]}..{bounds[1]}")
+    return value
