@@ -132,6 +132,8 @@ class ReportData:
     thumbnail:
         Gives the picture of a frame (grey or BGR, 8 bit, any size), or None where there is none;
         called from several threads.
+    skipped:
+        What the run tried and gave up, with the reason: it never became a frame.
     made:
         How it was made: versions, plan hash, seed, dates; shown as a table.
     """
@@ -146,6 +148,7 @@ class ReportData:
     truth: Truth | None = None
     simulated: bool = False
     thumbnail: Thumbnail | None = None
+    skipped: Mapping[str, str] = field(default_factory=dict)
     made: Mapping[str, str] = field(default_factory=dict)
 
     @property

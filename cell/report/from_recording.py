@@ -10,6 +10,7 @@ from calib.views import Views
 from cell.errors import InputError
 from cell.recording import Recording
 from cell.report.data import Image, ReportData, Thumbnail
+from cell.sequencer.journal import read_journal
 
 
 def recording_data(
@@ -24,14 +25,21 @@ def recording_data(
     made:
         How the results were made: versions, seed, dates.
     """
-    content = recording.header.model_dump(by_alias=True, mode="json")
+    content = recording.header.as_mapping()
     return ReportData(
         views=views,
         recording={**content, "name": recording.name},
         simulated=bool(content.get("simulated")),
         thumbnail=_thumbnail(recording) if recording.header.images else None,
+        skipped=_skipped(recording),
         made=made or {},
     )
+
+
+def _skipped(recording: Recording) -> dict[str, str]:
+    """The views the run gave up, by its journal; none where no run of ours made the recording."""
+    events = read_journal(recording.path)
+    return {f"view {e['view']}": e["reason"] for e in events if e["event"] == "skip"}
 
 
 def _thumbnail(recording: Recording) -> Thumbnail:

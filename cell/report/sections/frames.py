@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -34,8 +34,14 @@ def frames(data: ReportData) -> str:
     # reading and shrinking pictures is most of a report's time, and both leave the interpreter free
     with ThreadPoolExecutor(max_workers=_READERS) as readers:
         grid = "".join(readers.map(lambda f: _frame(data, f, rejected.get(f)), shown))
-    return html.section("frames", "Every frame", html.paragraph(words), _reasons(rejected),
-                        f'<div class="thumbs">{grid}</div>')  # fmt: skip
+    return html.section(
+        "frames",
+        "Every frame",
+        html.paragraph(words),
+        _reasons(rejected),
+        _skipped(data.skipped),
+        f'<div class="thumbs">{grid}</div>',
+    )
 
 
 def _thinned(numbers: list[int], rejected: dict[int, str]) -> list[int]:
@@ -49,6 +55,13 @@ def _reasons(rejected: dict[int, str]) -> str:
         return ""
     table = html.table(("rejected frame", "reason"), sorted(rejected.items()))
     return html.fold(f"Rejected frames and why ({len(rejected)})", table)
+
+
+def _skipped(skipped: Mapping[str, str]) -> str:
+    if not skipped:
+        return ""
+    table = html.table(("skipped while running", "reason"), skipped.items())
+    return html.fold(f"Skipped while running, and why ({len(skipped)})", table)
 
 
 def _frame(data: ReportData, frame: int, reason: str | None) -> str:
@@ -80,8 +93,8 @@ def _corner_paths(corners: FloatArray, cols: int, width_px: int) -> Iterator[str
     """All corners as dots, the first row again as a line that tells its start."""
     dots = "".join(f"M{u:.0f} {v:.0f}h0" for u, v in corners if np.isfinite(u))
     if dots:
-        yield f'<path class="halo" stroke-width="{width_px / 42:.0f}" d="{dots}"/>'
-        yield f'<path class="corners" stroke-width="{width_px / 70:.0f}" d="{dots}"/>'
+        yield f'<path class="halo" stroke-width="{width_px / 38:.0f}" d="{dots}"/>'
+        yield f'<path class="corners" stroke-width="{width_px / 62:.0f}" d="{dots}"/>'
     first = [f"{u:.0f} {v:.0f}" for u, v in corners[:cols] if np.isfinite(u)]
     if len(first) > 1:
         path = "M" + "L".join(first)
