@@ -79,9 +79,8 @@ class CameraSettings:
                 self._set(name, "Off")
         for name, value in self._names.full_frame:
             self._set_full_frame(name, value)
-        self._set("PixelFormat", pixel_format)
-        for name, value in features.items():
-            self._set(name, value)
+        for name, wanted in {"PixelFormat": pixel_format, **features}.items():
+            self._set(name, wanted)
 
     def set(self, exposure_s: float | None, gain_db: float | None) -> dict[str, float]:
         """Set what is given; returns `exposure_s` and `gain_db` as the camera then has them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator
 
@@ -33,7 +34,7 @@ def test_a_frame_is_a_whole_picture_with_its_time(rig: Rig) -> None:
 
 def test_each_frame_is_newer_than_the_one_before(rig: Rig) -> None:
     frames = [rig.camera.grab(TIMEOUT_S) for _ in range(5)]
-    assert all(rig.newer(a, b) for a, b in zip(frames, frames[1:], strict=False))
+    assert all(rig.newer(a, b) for a, b in itertools.pairwise(frames))
 
 
 def test_a_frame_shows_the_scene_after_the_call(rig: Rig) -> None:
@@ -55,7 +56,7 @@ def test_what_is_set_is_read_back_and_stands_in_the_frame(
 ) -> None:
     key = {"exposure": "exposure_s", "gain": "gain_db"}[name]
     if name not in rig.can:
-        with pytest.raises(DeviceRefused, match="no exposure|no gain|does not tell its settings"):
+        with pytest.raises(DeviceRefused, match=r"no exposure|no gain|does not tell its settings"):
             rig.camera.configure(**{key: values[0]})
         assert getattr(rig.camera.grab(TIMEOUT_S), key) is None
         return
