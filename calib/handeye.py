@@ -27,6 +27,11 @@ OUTLIER_SIGMA = 10.0
 MIN_FRAMES = 4
 _UNIT_RANGE = (0.7, 1.4)
 _LATERAL, _DEPTH, _ANGLES = slice(0, 2), slice(2, 3), slice(3, 6)
+_TELLING = np.array([True, True, False, True, True, True])
+_NOT_ANOTHER_POSE = np.array([3e-3] * 3 + [np.radians(0.5)] * 3)
+"""Metres and radians below which a frame does not carry another frame's pose, however exact the
+others are; far views and a wrong focal length reach such values honestly."""
+
 _MIN_ROTATION_RAD = np.radians(3.0)
 _FINEST = 1e-6  # metres or radians: below it numeric derivatives lose their digits
 
@@ -261,8 +266,11 @@ def _refine(
         variance = max(2 * fit.cost / freedom, 1e-12)
         jacobian = np.asarray(fit.jac, dtype=np.float64)
         covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True) * variance
-    standard = problem.residuals(X, Z) / problem.scales(problem.residuals(X, Z)[used])
+    residual = problem.residuals(X, Z)
+    standard = residual / problem.scales(residual[used])
     # A lens that moves its focus shifts good frames along the axis, and only there.
-    telling = np.abs(np.delete(standard, _DEPTH, axis=1))
-    distance = np.nan_to_num(telling.max(axis=1), nan=np.inf)
+    telling = np.abs(standard[:, _TELLING])
+    small = np.abs(residual) < _NOT_ANOTHER_POSE
+    distance = np.where(small.all(axis=1, where=_TELLING), 0.0, telling.max(axis=1))
+    distance = np.nan_to_num(distance, nan=np.inf)
     return X, Z, covariance, distance

@@ -6,19 +6,23 @@ import json
 import logging
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from calib.calibration import Calibration, calibrate
 from calib.calibration.mapping import as_mapping
 from calib.detection import Detection, detect
+from calib.detection.orientation import turned_order, turns_to_agree
 from calib.errors import CalibrationError
-from calib.orientation import same_order_everywhere
 from calib.views import Views
 from cell.errors import BadAnswer, InputError
 from cell.files.calibration_file import CalibrationFile
 from cell.recording import Corners, FrameRecord, Recording, write_corners
+from cell.report import ReportData, solution_poses, solution_residuals, write_report
+from cell.report.data import Image, Thumbnail
 
 FILE_NAME = "calibration.json"
 log = logging.getLogger(__name__)
@@ -85,6 +89,20 @@ def corners_of(recording: Recording, progress: Progress | None = None) -> Corner
     return detect_corners(recording, progress)
 
 
+def same_order_everywhere(views: Views) -> Views:
+    """The views with the corners of a symmetric board named alike in every complete frame."""
+    whole = np.flatnonzero(views.seen.all(axis=1))
+    turns = turns_to_agree(
+        views.corners_px[whole], views.board, views.base_from_flange[whole], views.mount
+    )
+    corners_px, sigma_px = views.corners_px.copy(), views.corner_sigma_px.copy()
+    for frame, turn in zip(whole, turns, strict=True):
+        order = turned_order(views.board, int(turn))
+        corners_px[frame] = views.corners_px[frame, order]
+        sigma_px[frame] = views.corner_sigma_px[frame, order]
+    return replace(views, corners_px=corners_px, corner_sigma_px=sigma_px)
+
+
 def calibrate_recording(
     recording: Recording, corners: Corners | None = None, progress: Progress | None = None
 ) -> Calibrated:
@@ -122,6 +140,76 @@ def default_folder(recording: Recording) -> Path:
     if os.access(recording.path, os.W_OK):
         return recording.path / "calibration"
     return Path.cwd() / f"{recording.name}-calibration"
+
+
+def calibrate_into(
+    recording: Recording,
+    folder: Path | None = None,
+    *,
+    progress: Progress | None = None,
+    simulated: bool = False,
+) -> tuple[Calibrated, Path]:
+    """`cell calibrate`: calibrate a recording and write `calibration.json` and `report.html`.
+
+    Parameters
+    ----------
+    recording:
+        Nothing of it is changed.
+    folder:
+        Where to; `default_folder` where None.
+    progress:
+        Told after every picture searched.
+    simulated:
+        Puts the banner on the report.
+
+    Returns
+    -------
+    The calibration and the folder it stands in.
+
+    Raises
+    ------
+    BadAnswer, InputError
+        As `calibrate_recording` and `write_calibration` do.
+    """
+    folder = default_folder(recording) if folder is None else folder
+    corners = corners_of(recording, progress)
+    calibrated = calibrate_recording(recording, corners)
+    write_calibration(calibrated, folder, None if recording.has_detections else corners)
+    write_report(folder / "report.html", report_data(recording, calibrated, simulated=simulated))
+    return calibrated, folder
+
+
+def report_data(
+    recording: Recording, calibrated: Calibrated, *, simulated: bool = False
+) -> ReportData:
+    """What the report shows of a calibration alone."""
+    return ReportData(
+        views=calibrated.views,
+        recording=recording.header.as_mapping(),
+        calibration=calibrated.mapping,
+        residuals_px=solution_residuals(calibrated.result),
+        poses=solution_poses(calibrated.result, calibrated.views),
+        simulated=simulated,
+        thumbnail=_thumbnails(recording),
+    )
+
+
+def _thumbnails(recording: Recording) -> Thumbnail:
+    """Pictures by frame number, grey, None where a frame has none that can be read."""
+    by_number = {frame.frame: frame for frame in recording.frames}
+
+    def picture(number: int) -> Image | None:
+        frame = by_number.get(number)
+        if frame is None or frame.image is None:
+            return None
+        try:
+            image = recording.image(frame)
+        except InputError:
+            return None
+        depth = 257 if image.dtype == np.uint16 else 1
+        return (image.astype(np.float32) / depth).astype(np.uint8)
+
+    return picture
 
 
 def write_calibration(calibrated: Calibrated, folder: Path, corners: Corners | None = None) -> Path:

@@ -20,6 +20,9 @@ FRAME_OUTLIER = 6.0
 """A frame this many times worse than the median one is a wrong detection."""
 
 CORNER_OUTLIER = 8.0
+_LONGEST_LENS = 25.0
+"""Scale factor over image size: a field of 2.3 degrees, narrower than any cell's camera."""
+
 _SQUARE_SHARE = 0.03
 """A wrong detection is off by a good share of a square; a lens that moves its focus is not."""
 
@@ -113,7 +116,7 @@ def _plausible(row: FloatArray, views: Views) -> bool:
         abs(row[COLUMN["u0_px"]] / views.width_px - 0.5) < 0.4
         and abs(row[COLUMN["v0_px"]] / views.height_px - 0.5) < 0.4
     )
-    return bool(centred and 0.2 * size < alpha < 50 * size and 0.6 < alpha / beta < 1.6)
+    return bool(centred and 0.2 * size < alpha < _LONGEST_LENS * size and 0.6 < alpha / beta < 1.6)
 
 
 def fit_subset(
@@ -194,9 +197,11 @@ def _corner_weight(residual_px: FloatArray, views: Views, used: BoolArray) -> Fl
 
 
 def _check(fit: FreePoseFit, views: Views) -> None:
-    alpha = np.nanmean(fit.optics[:, COLUMN["alpha_px"]])
-    sigma = np.sqrt(fit.covariance[0, 0])
-    if not (np.isfinite(sigma) and 0 < sigma < 0.3 * alpha):
+    alpha = float(np.nanmean(fit.optics[:, COLUMN["alpha_px"]]))
+    sigma = float(np.sqrt(fit.covariance[0, 0]))
+    size = max(views.width_px, views.height_px)
+    known = np.isfinite(sigma) and 0 < sigma < 0.3 * alpha
+    if not (known and 0.1 * size < alpha < _LONGEST_LENS * size):
         raise CalibrationError(
             f"the views leave the focal length open ({alpha:.0f} ± {sigma:.0f} px):"
             " add views with the board tilted 20 to 45 degrees about both axes"

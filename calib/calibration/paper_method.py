@@ -91,7 +91,7 @@ def run_paper_method(
         factors = _scale_factors(
             views, chosen, weight, model, distance, principal, reference.flange_sigma_m
         )
-        alpha, beta = _held(factors, distance, common)
+        alpha, beta = _held(factors, common, reference)
         solutions = _fixed_alpha(views, part, weight, homographies, distance, alpha.law, beta)
         model = solutions["fixed_alpha_mle"]
         principal = (model.values["u0_px"], model.values["v0_px"])
@@ -179,7 +179,7 @@ class _Alpha:
 
 
 def _held(
-    factors: tuple[ScaleFactor, ...], distance: FloatArray, common_sigma_m: float
+    factors: tuple[ScaleFactor, ...], common_sigma_m: float, reference: RobotReference
 ) -> tuple[_Alpha, FocusLaw]:
     """Laws of alpha and beta: the preferred one of alpha, and the same for beta."""
     d, alpha, alpha_sigma, beta, beta_sigma = _columns(factors)
@@ -187,6 +187,7 @@ def _held(
     choice = choose_focus_law(
         d, alpha, alpha_sigma, per_distance_px_m=per_metre, common_distance_sigma_m=common_sigma_m
     )
+    choice = None if choice is None else _borne_out(choice, reference)
     name = "constant" if choice is None else choice.preferred.law
     law = choice.preferred if choice is not None else _mean_law(d, alpha, alpha_sigma)
     if name == "constant":
@@ -201,6 +202,24 @@ def _held(
         common_distance_sigma_m=common_sigma_m,
     )
     return _Alpha(law, choice), beta_law
+
+
+def _borne_out(choice: FocusLawChoice, reference: RobotReference) -> FocusLawChoice:
+    """Ask the joint fit of pictures and robot where the scale factors alone are a poor witness.
+
+    They inherit every error of the arm's distances. So a lens that the joint fit knows to stand
+    still is taken to stand still, and between two laws that fit alike its choice counts.
+    """
+    preferred = choice.preferred.law
+    if preferred == "constant" or reference.source != "joint" or reference.law == preferred:
+        return choice
+    if reference.law is not None and choice.decisive:
+        return choice
+    instead = reference.law or "constant"
+    found = next((c for c in choice.candidates if c.law == instead), choice.preferred)
+    why = f"{choice.why}; the joint fit of pictures and robot gains {reference.gain_aic:.1f} AIC by"
+    why += " a moving lens" + (f", and by {instead} most" if reference.law else ": too little")
+    return replace(choice, preferred=found, decisive=False, why=why)
 
 
 def _mean_law(d: FloatArray, scale: FloatArray, sigma: FloatArray) -> FocusLaw:

@@ -1,0 +1,101 @@
+"""`cell calibrate` on recordings: files in, files out, clear words for what cannot be."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib.views import Views
+from cell.calibrate import calibrate_into, default_folder, same_order_everywhere
+from cell.errors import BadAnswer, InputError
+from cell.recording import read_recording
+from tests.paper.scene import mixed_scene
+
+
+def _write(folder: Path, views: Views) -> Path:
+    folder.mkdir()
+    board = views.board
+    (folder / "recording.yaml").write_text(
+        f"schema: cell.recording/1\nname: bench\nrobot: {{model: null}}\n"
+        f"camera: {{width: {views.width_px}, height: {views.height_px}}}\n"
+        f"board: {{type: chessboard, rows: {board.rows}, cols: {board.cols},"
+        f" square_m: {board.square_m}}}\nmount: {views.mount}\nimages: null\n"
+    )
+    from scipy.spatial.transform import Rotation
+
+    with (folder / "frames.jsonl").open("w") as file:
+        for number, pose in zip(views.frame, views.base_from_flange, strict=True):
+            q = Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
+            pose_record = {"p_m": pose[:3, 3].tolist(), "q_xyzw": q}
+            line = {"frame": int(number), "image": None, "base_from_flange": pose_record}
+            file.write(json.dumps(line) + "\n")
+    with (folder / "detections.csv").open("w") as file:
+        file.write("frame,row,col,u_px,v_px\n")
+        for number, corners in zip(views.frame, views.corners_px, strict=True):
+            for m, (u, v) in enumerate(corners):
+                if np.isfinite(u):
+                    file.write(f"{number},{m // board.cols},{m % board.cols},{u:.4f},{v:.4f}\n")
+    return folder
+
+
+def test_it_writes_the_file_and_the_report_and_leaves_the_recording_alone(tmp_path: Path) -> None:
+    folder = _write(tmp_path / "bench", mixed_scene(noise_px=0.1).views)
+    before = {p.name: p.read_bytes() for p in folder.iterdir()}
+    calibrated, out = calibrate_into(read_recording(folder), tmp_path / "out")
+    content = json.loads((out / "calibration.json").read_text())
+    assert content == json.loads(json.dumps(calibrated.mapping))
+    assert content["schema"] == "cell.calibration/1"
+    assert len(content["frames_used"]) == 27
+    assert (out / "report.html").stat().st_size > 10_000
+    assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
+
+
+def test_results_go_beside_the_recording_or_here_where_it_is_read_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = read_recording(_write(tmp_path / "bench", mixed_scene(noise_px=0.1).views))
+    assert default_folder(recording) == tmp_path / "bench" / "calibration"
+    monkeypatch.setattr("cell.calibrate.os.access", lambda *_: False)
+    monkeypatch.chdir(tmp_path)
+    assert default_folder(recording) == tmp_path / "bench-calibration"
+
+
+def test_two_frames_only_is_a_bad_answer_with_exit_status_1(tmp_path: Path) -> None:
+    views = mixed_scene(noise_px=0.1).views.take(np.array([0, 20]))
+    with pytest.raises(BadAnswer, match="2 of 2 frames") as caught:
+        calibrate_into(read_recording(_write(tmp_path / "two", views)), tmp_path / "out")
+    assert caught.value.exit_status == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_pictures_that_are_no_images_are_told_frame_by_frame(tmp_path: Path) -> None:
+    folder = _write(tmp_path / "bad", mixed_scene().views.take(np.arange(4)))
+    (folder / "detections.csv").unlink()
+    (folder / "broken.png").write_text("not a picture")
+    lines = [json.loads(line) for line in (folder / "frames.jsonl").read_text().splitlines()]
+    text = "".join(json.dumps(line | {"image": "broken.png"}) + "\n" for line in lines)
+    (folder / "frames.jsonl").write_text(text)
+    with pytest.raises(BadAnswer, match="is not an image"):
+        calibrate_into(read_recording(folder), tmp_path / "out")
+
+
+def test_an_output_that_cannot_be_written_is_bad_input(tmp_path: Path) -> None:
+    folder = _write(tmp_path / "bench", mixed_scene(noise_px=0.1).views)
+    (tmp_path / "out").write_text("a file, not a folder")
+    with pytest.raises(InputError, match="cannot be written"):
+        calibrate_into(read_recording(folder), tmp_path / "out")
+
+
+def test_half_turned_frames_of_a_symmetric_board_are_turned_back(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    from calib.views import Board
+
+    views = mixed_scene(noise_px=0.1).views
+    even = Board("chessboard", rows=7, cols=9, square_m=0.025)
+    corners = views.corners_px.reshape(len(views), 7, 10, 2)[:, :, :9].reshape(len(views), 63, 2)
+    turned = corners.copy()
+    turned[[2, 9, 20]] = turned[[2, 9, 20], ::-1]
+    plain = replace(views, board=even, corners_px=turned, corner_sigma_px=np.zeros((27, 63)))
+    assert np.array_equal(same_order_everywhere(plain).corners_px, corners)
