@@ -18,7 +18,7 @@ Not taken:
   seen whole from 0.38 m on, its corners from 0.3 m. Runs begin at 0.34 m: in zone 2, like its own.
 - Series up to 2.7 m (12CXP+) and 1.2 m (Robotiq): an IRB 140 reaches 0.8 m, a UR3 0.5 m. With the
   board upright 1.2 m in front of the IRB 140 the camera stands 0.35 m to 0.95 m away; with it
-  0.78 m in front of the UR3, 0.34 m to 0.58 m. For farther views the board has to be moved.
+  0.76 m in front of the UR3, 0.34 m to 0.56 m. For farther views the board has to be moved.
 
 Focus breathing: Eq. 25, alpha = alpha0 - k / d^2. The paper gives no k, and two of its statements
 ask for different ones. If alpha is to be constant to a percent beyond 0.7 m, k is at most
@@ -122,7 +122,7 @@ def ur3_robotiq(seed: int = 0) -> SimulatedCell:
         model=_paper_model(
             optics,
             _pose([0.0006, 0.0357, -0.0001], slant, [0.5, 0.6, -0.4]),
-            _upright_board(0.78, 0.30, [0.6, -0.4, 0.5]),
+            _upright_board(0.76, 0.30, [0.6, -0.4, 0.5]),
             zone_1_ends_m=0.15,
         ),
         camera=CameraSpec(

@@ -100,7 +100,7 @@ def test_autofocus_follows_the_board_and_is_logged():
     cell = ur3_robotiq()
     arm, camera, clock = ready(cell)
     positions = []
-    for distance in (0.36, 0.45, 0.56):
+    for distance in (0.36, 0.45, 0.55):
         go(arm, clock, straight_on(cell, distance))
         positions.append(camera.focus(AUTO))
         frame = camera.grab(1.0)
@@ -277,7 +277,7 @@ def test_charuco_corners_survive_one_by_one():
     ("cell", "distances"),
     [
         (irb140_eosens(), np.arange(0.35, 0.951, 0.05)),
-        (ur3_robotiq(), np.arange(0.34, 0.581, 0.02)),
+        (ur3_robotiq(), np.arange(0.34, 0.561, 0.02)),
     ],
     ids=["irb140-eosens", "ur3-robotiq"],
 )

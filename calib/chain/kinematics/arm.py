@@ -36,7 +36,7 @@ class ArmKinematics:
     max_speed_rad_s:
         (6,) greatest joint speeds.
     reach_m:
-        Greatest distance of the wrist from the shoulder axis that the maker states.
+        The maker's figure for how far the wrist gets from joint 1's axis.
     masses:
         Link masses and centres of mass, for `gravity_torques`.
     """
@@ -121,7 +121,8 @@ class ArmKinematics:
             x, y, z = base_from_flange[:3, 3]
             raise OutOfReach(
                 f"{self.name} cannot put its flange at x={x:.3f} y={y:.3f} z={z:.3f} m in that "
-                "orientation within its joint limits: bring the target nearer, or turn it"
+                f"orientation within its joint limits (reach {self.reach_m} m): bring the target "
+                "nearer, or turn it"
             )
         return np.asarray(branches[0])
 
