@@ -73,14 +73,14 @@ class Truth:
 class Evidence:
     """What the diagnosis measured per view, before and after the effects it found; N views.
 
-    Before is the plain model, after the final one. Frames: the error of a view is what has to be
-    added to the camera's pose by the robot to reach the pose its picture shows, in the camera
-    frame.
+    Before is the plain model, after the final one. An error is the camera's pose by the picture
+    against the one by the robot, in the camera frame by the robot: positive z is too close to
+    the board.
 
     Attributes
     ----------
     before_px, after_px:
-        (N, M, 2) corner residuals at the robot's poses, pixels.
+        (N, M, 2) corner residuals that no camera pose could absorb, pixels.
     shift_before_m, shift_after_m:
         (N, 3) error of the camera's position, metres.
     turn_before_rad, turn_after_rad:
@@ -89,9 +89,12 @@ class Evidence:
         The same errors by effect name, under the final model with that one effect left out; they
         show an effect apart from the others, and take the place of before where they are given.
     alpha_px, alpha_sigma_px:
-        (N,) scale factor of each view left free, and its one-sigma, pixels.
+        (N,) scale factor of each view when the robot's depth is believed, and its one-sigma.
     board_offset_m:
         (M, 3) where the corners were found to be, less where the drawing has them, board frame.
+    distance_m, gravity_in_camera, joints_rad:
+        (N,) distance of the board's centre, (N, 3) unit vectors of gravity as the camera feels
+        it, (N, J) joints, recovered where they were not logged.
     """
 
     before_px: FloatArray | None = None
@@ -105,6 +108,9 @@ class Evidence:
     alpha_px: FloatArray | None = None
     alpha_sigma_px: FloatArray | None = None
     board_offset_m: FloatArray | None = None
+    distance_m: FloatArray | None = None
+    gravity_in_camera: FloatArray | None = None
+    joints_rad: FloatArray | None = None
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from calib.chain.rigid import inverse
 from calib.handeye import camera_position_error_m
@@ -73,16 +72,9 @@ def best_poses(data: ReportData) -> SolutionPoses | None:
     return None if name is None else data.poses[name]
 
 
-def gravity_in_camera(data: ReportData) -> FloatArray | None:
-    """(N, 3) direction of gravity in the camera frame, from the robot's poses.
-
-    The robot's base is taken to stand upright (base z up).
-    """
-    hand_eye = (data.calibration or {}).get("flange_from_camera")
-    if not hand_eye or not hand_eye.get("q_xyzw") or not data.views.has_pose.any():
-        return None
-    if data.views.mount != "eye_in_hand":
-        return None
-    flange_from_camera = Rotation.from_quat(hand_eye["q_xyzw"]).as_matrix()
-    base_from_camera = data.views.base_from_flange[:, :3, :3] @ flange_from_camera
-    return np.asarray(-base_from_camera[:, 2, :])
+def frame_distance_m(data: ReportData) -> FloatArray | None:
+    """(N,) distance of each frame by the best solution, or else by the diagnosis."""
+    poses = best_poses(data)
+    if poses is not None:
+        return distance_m(poses.board_from_camera, data.views.board)
+    return None if data.evidence is None else data.evidence.distance_m

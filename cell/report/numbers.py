@@ -68,7 +68,9 @@ def measured(value: float | None, sigma: float | None, unit: str = "") -> str:
     if not known(value):
         return UNKNOWN
     value, sigma, unit = _readable(value, sigma, unit)
-    if not known(sigma) or sigma <= 0:
+    if sigma == 0:  # a choice, such as a frame's number, not a measurement
+        return _join(f"{value:g}", unit)
+    if not known(sigma):
         return f"{number(value, unit, 5)} (± not known)"
     return _join(plus_minus(value, sigma), unit)
 

@@ -229,6 +229,8 @@ def evidence(made: MadeUp) -> Evidence:
         turn_after_rad=made.rng.normal(0, 1e-4, (count, 3)),
         alpha_px=ALPHA_PX - K_PX_M2 / made.distance_m**2 + made.rng.normal(0, 0.6, count),
         alpha_sigma_px=np.full(count, 0.6),
+        distance_m=made.distance_m,
+        gravity_in_camera=-made.board_from_camera[:, 2, :3],
         board_offset_m=1e-4 * made.rng.normal(0, 1, (corners, 3)),
     )
 

@@ -147,7 +147,9 @@ def test_a_diagnosis_alone_makes_a_report(tmp_path: Path) -> None:
     _, text = parsed(data, tmp_path)
     assert "No calibration was made here" in text
     assert "focus breathing (inverse square)" in text
-    assert "Not drawn: it needs" in text
+    assert "Not drawn" not in text
+    _, text = parsed(replace(data, evidence=None), tmp_path)
+    assert "Not drawn: it needs each frame's camera pose" in text
 
 
 def test_what_is_unexplained_warns_in_the_first_sentence(tmp_path: Path) -> None:

@@ -32,7 +32,8 @@ def named_joint(effect: Mapping[str, Any]) -> int | None:
 def error_against_joints(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
     """The error component that moved most, against each joint's angle, before and after."""
     shifts = shifts_m(data, effect)
-    joints = data.views.joints_rad
+    joints = data.evidence.joints_rad if data.evidence else None
+    joints = data.views.joints_rad if joints is None else joints
     if shifts is None or not np.isfinite(joints).any():
         return None
     axis = int(np.argmax(np.nanstd(shifts[0], axis=0)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.chain.effects import make_effect
 from calib.chain.model import CellModel, start
-from calib.chain.optics import OPTICS
+from calib.chain.optics import optics_row
 from calib.views import FloatArray
 from cell.report.data import ReportData
 from cell.report.figures.canvas import BLACK, panels
@@ -50,7 +50,7 @@ def _by_law(data: ReportData, effect: Mapping[str, Any]) -> FloatArray | None:
         present = make_effect(effect["name"], values | _law(effect))
     except KeyError:
         return None
-    plain = CellModel(np.zeros(len(OPTICS)), np.eye(4), np.eye(4))
+    plain = CellModel(optics_row(), np.eye(4), np.eye(4))
     walk = start(plain, data.views.take(np.array([0])), None)
     present.effect.act(present.values, walk)
     return np.asarray(walk.points_m - data.views.board.corners_m)

@@ -12,7 +12,7 @@ from cell.report.data import ReportData
 from cell.report.evidence.scatter import WITH, WITHOUT, Pair, before_after, component, shifts_m
 from cell.report.figures.canvas import BLACK, BLUE, GREY, ORANGE, legend_below, panels
 from cell.report.figures.scale_factors import law_px
-from cell.report.geometry import best_poses, distance_m
+from cell.report.geometry import frame_distance_m
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,12 +20,11 @@ if TYPE_CHECKING:
 
 
 def alpha_and_depth(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
-    """α of each frame left free, and the depth error, against distance."""
-    poses, shifts = best_poses(data), shifts_m(data, effect)
+    """α of each frame at the robot's depth, and the depth error, against distance."""
+    distance, shifts = frame_distance_m(data), shifts_m(data, effect)
     alpha = data.evidence.alpha_px if data.evidence else None
-    if poses is None or (shifts is None and alpha is None):
+    if distance is None or (shifts is None and alpha is None):
         return None
-    distance = distance_m(poses.board_from_camera, data.views.board)
     figure, axes = panels(9.2, 3.2, columns=(alpha is not None) + (shifts is not None))
     if alpha is not None:
         _alpha(axes[0], data, effect, distance)
@@ -37,10 +36,9 @@ def alpha_and_depth(data: ReportData, effect: Mapping[str, Any]) -> Figure | Non
 
 def by_focus_direction(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
     """Depth error against distance, split by the direction from which focus was reached."""
-    poses, shifts = best_poses(data), shifts_m(data, effect)
-    if poses is None or shifts is None:
+    distance, shifts = frame_distance_m(data), shifts_m(data, effect)
+    if distance is None or shifts is None:
         return None
-    distance = distance_m(poses.board_from_camera, data.views.board)
     focus = data.views.focus_position
     came = np.diff(focus if np.isfinite(focus).all() else distance, prepend=np.nan)
     names = (WITHOUT, WITH)
@@ -63,7 +61,7 @@ def _alpha(ax: Axes, data: ReportData, effect: Mapping[str, Any], distance: np.n
     assert found.alpha_px is not None
     sigma = np.zeros(len(distance)) if found.alpha_sigma_px is None else found.alpha_sigma_px
     ax.errorbar(distance, found.alpha_px, np.nan_to_num(sigma), fmt="x", color=BLACK, ecolor=GREY,
-                label="α of each frame, ± 1σ")  # fmt: skip
+                label="α at the robot's depth, ± 1σ")  # fmt: skip
     grid = np.linspace(np.nanmin(distance), np.nanmax(distance), 120)
     curve = law_px(_with_base(effect, data), grid)
     if curve is not None:

@@ -11,7 +11,6 @@ import numpy as np
 from cell.report.data import ReportData
 from cell.report.evidence.scatter import before_after, component, shifts_m, turns_rad
 from cell.report.figures.canvas import legend_below, panels
-from cell.report.geometry import gravity_in_camera
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 def error_against_gravity(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
     """The turn (or else shift) that varies most, against gravity along the camera's axes."""
-    gravity = gravity_in_camera(data)
+    gravity = None if data.evidence is None else data.evidence.gravity_in_camera
     errors, word, unit = turns_rad(data, effect), "turn about", "mrad"
     if errors is None:
         errors, word, unit = shifts_m(data, effect), "shift along", "mm"

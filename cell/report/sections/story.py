@@ -33,6 +33,7 @@ def story(data: ReportData) -> str:
         "diagnosis",
         f"Diagnosis: {verdict.lower()}",
         html.paragraph(f"{meaning[0].upper()}{meaning[1:]}.", "lead"),
+        html.bullets(data.diagnosis.get("said") or []),
         _where(data),
         *(_effect(data, effect) for effect in data.diagnosis.get("effects") or []),
         _unexplained(data.diagnosis),
@@ -71,8 +72,7 @@ def _effect(data: ReportData, effect: Mapping[str, Any]) -> str:
         [
             ("What it is", effect.get("physics") or "not described"),
             ("How large", parameters(effect.get("parameters") or {}) or "no parameters"),
-            ("How sure", f"p {probability(effect.get('p_value'))}; held-out frames improve by "
-                         f"{number(effect.get('holdout_gain_px'), 'px', 2)}"),
+            ("How sure", _sureness(effect)),
             ("What it costs", _cost(data, effect)),
             ("What to do", remedy),
         ],
@@ -81,6 +81,12 @@ def _effect(data: ReportData, effect: Mapping[str, Any]) -> str:
         f'<article class="effect"><h3>{html.text(effect.get("link"))}: {html.text(name + law)}</h3>'
         f'<div class="facts">{facts}</div>{_picture(data, effect)}</article>'
     )
+
+
+def _sureness(effect: Mapping[str, Any]) -> str:
+    gain = effect.get("holdout_gain_px")
+    held = f"; held-out frames improve by {number(gain, 'px', 2)}" if gain else ""
+    return f"p {probability(effect.get('p_value'))}{held}"
 
 
 def _picture(data: ReportData, effect: Mapping[str, Any]) -> str:

@@ -1,0 +1,84 @@
+"""The evidence the report draws, out of the models a diagnosis ends with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calib.chain.model import CellModel
+from calib.views import FloatArray, Views
+from cell.report.data import Evidence
+from cell.report.pose_errors import (
+    PoseErrors,
+    pose_errors,
+    scale_at_robot_depth,
+    without_constant_part,
+)
+
+
+def evidence(
+    views: Views,
+    mended: Views,
+    before: CellModel,
+    twin: CellModel,
+    *,
+    corner_px: float,
+    flange_m: float,
+) -> Evidence:
+    """What each frame measured, before and after the effects that were found.
+
+    Parameters
+    ----------
+    views, mended:
+        The N frames of the report as they were logged, and those the diagnosis used, their
+        book-keeping mended; frames are matched by number.
+    before, twin:
+        The plain cell, and the one with all that was found.
+    corner_px, flange_m:
+        Noise levels of the twin: one sigma of a corner and of the flange, per axis.
+    """
+    plain, final = pose_errors(before, views), pose_errors(twin, mended)
+    alpha, alpha_sigma = scale_at_robot_depth(plain, views, corner_px, flange_m)
+    alone = {name: _aligned(e, mended, views) for name, e in _left_out(twin, mended).items()}
+    return Evidence(
+        before_px=plain.residual_px,
+        after_px=_aligned(final.residual_px, mended, views),
+        shift_before_m=plain.shift_m,
+        shift_after_m=_aligned(final.shift_m, mended, views),
+        turn_before_rad=plain.turn_rad,
+        turn_after_rad=_aligned(final.turn_rad, mended, views),
+        shift_without_m={name: error[:, :3] for name, error in alone.items()},
+        turn_without_rad={name: error[:, 3:] for name, error in alone.items()},
+        alpha_px=alpha,
+        alpha_sigma_px=alpha_sigma,
+        board_offset_m=_offset(final, views),
+        distance_m=plain.state.distance_m,
+        gravity_in_camera=plain.state.gravity_in_camera(),
+        joints_rad=_aligned(mended.joints_rad, mended, views),
+    )
+
+
+def _left_out(twin: CellModel, mended: Views) -> dict[str, FloatArray]:
+    """Per effect (N, 6) errors of the twin without it; with one effect alone, before says that."""
+    if len(twin.effects) < 2:
+        return {}
+    return {
+        left.effect.name: without_constant_part(
+            pose_errors(twin.with_effects(e for e in twin.effects if e is not left), mended)
+        )
+        for left in twin.effects
+    }
+
+
+def _offset(final: PoseErrors, views: Views) -> FloatArray | None:
+    offset = final.state.points_m - views.board.corners_m
+    return offset if np.abs(offset).max() > 0 else None
+
+
+def _aligned(values: FloatArray, mended: Views, views: Views) -> FloatArray:
+    """Rows of the mended frames in the places those frames have in the report; NaN elsewhere."""
+    out = np.full((len(views), *values.shape[1:]), np.nan)
+    rows = {int(frame): row for row, frame in enumerate(mended.frame)}
+    for place, frame in enumerate(views.frame):
+        if int(frame) in rows:
+            out[place] = values[rows[int(frame)]]
+    return out
