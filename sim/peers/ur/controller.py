@@ -16,8 +16,8 @@ from drivers.arm import Arm, ArmState, Motion, MoveTarget
 from drivers.errors import DeviceError, SafetyError
 from drivers.ur.pose import base_from_tcp, pose_of
 from drivers.ur.wire import RTDE_PORT, Value
+from sim.peers.listener import Listener
 from sim.peers.ur.dashboard import DashboardServer
-from sim.peers.ur.listener import Listener
 from sim.peers.ur.primary import PrimaryServer
 from sim.peers.ur.program import ControlProgram
 from sim.peers.ur.rtde import RtdeServer

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -13,10 +14,12 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from calib.chain.kinematics import arm as kinematics_of
+from drivers.abb import ABBArm, ABBSettings
 from drivers.arm import Arm, ArmState, Motion, MoveTarget
 from drivers.ur import URArm, URSettings
 from sim.arm import SimArm
 from sim.clock import WallClock
+from sim.peers.abb import ABBController
 from sim.peers.ur import URController
 
 UR_HOME = (0.1, -1.4, 1.6, -1.7, -1.5, 0.2)
@@ -102,6 +105,46 @@ def ur_bench() -> Iterator[Bench]:
             controller.kill,
             lambda: [event.t_s for event in controller.events if event.what.startswith("halt")],
         )
+
+
+ABB_HOME = (0.1, 0.2, -0.3, 0.1, 0.6, 0.2)
+
+
+@contextmanager
+def abb_peer(egm_port: int | None = None) -> Iterator[tuple[ABBController, SimArm]]:
+    sim = simulated("irb140", ABB_HOME)
+    with ABBController(sim, own_address(), egm_port=egm_port) as controller:
+        yield controller, sim
+
+
+def free_udp_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def abb_bench(egm: bool = False) -> Iterator[Bench]:
+    port = free_udp_port() if egm else None
+    with ExitStack() as stack:
+        controller, sim = stack.enter_context(abb_peer(port))
+        arm = ABBArm(controller.url, ABBSettings(egm_port=port))
+        stack.callback(arm.close)
+        yield Bench(
+            arm,
+            sim,
+            "irb140",
+            ABB_HOME,
+            controller.guard_stop,
+            controller.kill,
+            lambda: [event.t_s for event in controller.events if event.what.startswith("halt")],
+        )
+
+
+@contextmanager
+def abb_egm_bench() -> Iterator[Bench]:
+    with abb_bench(egm=True) as bench:
+        yield bench
 
 
 def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> bool:

@@ -5,13 +5,22 @@ import time
 
 import numpy as np
 import pytest
-from benches import quickly, sim_bench, slowly, until, ur_bench, wait_steady
+from benches import (
+    abb_bench,
+    abb_egm_bench,
+    quickly,
+    sim_bench,
+    slowly,
+    until,
+    ur_bench,
+    wait_steady,
+)
 from scipy.spatial.transform import RigidTransform
 
 from drivers.arm import Motion, MoveTarget
 from drivers.errors import ArmStopped, DeviceError, DeviceRefused, DeviceUnreachable, SafetyError
 
-BENCHES = {"in process": sim_bench, "ur": ur_bench}
+BENCHES = {"in process": sim_bench, "ur": ur_bench, "abb": abb_bench, "abb egm": abb_egm_bench}
 BLOCK_S = 0.05
 # the machine that runs the tests may be busy with something else for a while
 SLACK_S = 0.05

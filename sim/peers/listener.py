@@ -35,12 +35,12 @@ class Listener:
         with self._lock:
             connections, self._connections = self._connections, set()
         for link in connections:
-            _shut(link)
+            shut(link)
 
     def close(self) -> None:
         """Close the port and every connection."""
         self._open = False
-        _shut(self._server)
+        shut(self._server)
         self._thread.join(timeout=1.0)
         self.drop()
 
@@ -60,10 +60,11 @@ class Listener:
             self._serve(link)
         with self._lock:
             self._connections.discard(link)
-        _shut(link)
+        shut(link)
 
 
-def _shut(link: socket.socket) -> None:
+def shut(link: socket.socket) -> None:
+    """Close a socket and wake whoever is blocked on it."""
     # close() alone leaves a thread that is blocked in recv or accept asleep
     with contextlib.suppress(OSError):
         link.shutdown(socket.SHUT_RDWR)

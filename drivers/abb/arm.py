@@ -1,0 +1,153 @@
+"""An ABB arm on an IRC5 controller with RobotWare 6 (IRB 140 and its like)."""
+
+from __future__ import annotations
+
+from drivers.abb.egm import EgmReader
+from drivers.abb.readings import Reading, world_from_base
+from drivers.abb.rws import named
+from drivers.abb.settings import ABBSettings
+from drivers.abb.status import fault_in
+from drivers.abb.supervisor import Supervisor
+from drivers.arm import ArmState, Motion, MoveTarget
+from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable, StopFailed
+from drivers.targets import check_target
+from drivers.untried import warn_untried
+
+
+class ABBArm:
+    """Moves by motion programs through Robot Web Services; reads poses there and from EGM.
+
+    Parameters
+    ----------
+    url:
+        Such as ``http://192.168.125.1``.
+    settings:
+        See `ABBSettings`.
+    """
+
+    tried_on_hardware = False
+
+    def __init__(self, url: str, settings: ABBSettings | None = None) -> None:
+        self._url = url
+        self._settings = settings or ABBSettings()
+        self._supervisor: Supervisor | None = None
+        self._egm: EgmReader | None = None
+
+    def connect(self) -> None:
+        """Log in, check that the arm may be driven, and begin to poll.
+
+        Raises
+        ------
+        DeviceUnreachable
+            No answer.
+        DeviceRefused
+            Wrong password, or a RAPID program is running already.
+        ArmStopped
+            Not in automatic mode, motors off, or stopped for safety.
+        """
+        self.close()
+        warn_untried(f"ABB arm at {self._url}", "a simulated IRC5 on loopback")
+        supervisor = Supervisor(self._url, self._settings)
+        try:
+            self._open(supervisor)
+        except Exception:
+            supervisor.close()
+            self.close()
+            raise
+
+    def state(self) -> ArmState:
+        """Return the newest reading: EGM's while a program runs and it comes, else RWS's.
+
+        Raises `DeviceUnreachable` when it is stale, `StopFailed` when a stop was not confirmed.
+        """
+        supervisor = self._connected()
+        if supervisor.stop_failed is not None:
+            raise StopFailed(self._named(f"{supervisor.stop_failed}. Press the emergency stop"))
+        reading = self._reading(supervisor)
+        return ArmState(
+            host_t_s=reading.host_t_s,
+            controller_t_s=reading.controller_t_s,
+            joints_rad=reading.joints_rad,
+            joint_velocity_rad_s=None,
+            base_from_flange=reading.base_from_flange,
+            motion=_motion(supervisor),
+            fault=supervisor.fault,
+            raw=reading.raw,
+        )
+
+    def start_move(self, target: MoveTarget) -> None:
+        """Begin a move; see `drivers.arm.Arm` and `drivers.abb.program.build_program`."""
+        settings = self._settings
+        check_target(
+            target,
+            max_joint_speed_rad_s=settings.max_joint_speed_rad_s,
+            max_tcp_speed_m_s=settings.max_tcp_speed_m_s,
+            joint_limits_rad=settings.joint_limits_rad,
+        )
+        supervisor = self._connected()
+        self._reading(supervisor)
+        if supervisor.fault is not None:
+            raise ArmStopped(self._named(supervisor.fault))
+        if supervisor.busy:
+            raise DeviceRefused(self._named("still moving: wait until it is steady, or stop it"))
+        supervisor.order(target)
+
+    def stop(self) -> None:
+        """Stop RAPID on two ways, or else the motors; see `drivers.abb.stopper`."""
+        supervisor = self._supervisor
+        failure = supervisor.stop() if supervisor is not None else None
+        if failure is not None:
+            raise StopFailed(
+                self._named(f"the stop was not taken ({failure}). Press the emergency stop")
+            )
+
+    def close(self) -> None:
+        """Stop and let go of the controller. Idempotent."""
+        if self._supervisor is not None:
+            self._supervisor.close()
+            self._supervisor = None
+        if self._egm is not None:
+            self._egm.close()
+            self._egm = None
+
+    def _open(self, supervisor: Supervisor) -> None:
+        rws = supervisor.rws
+        with named(self._url):
+            fault = fault_in(rws)
+            running = rws.get_execution_state().ctrlexecstate == "running"
+            offset = world_from_base(rws)
+        if fault is not None:
+            raise ArmStopped(self._named(fault))
+        if running:
+            raise DeviceRefused(self._named("a RAPID program is running: stop it first"))
+        if self._settings.egm_port is not None:
+            self._egm = EgmReader(self._settings.egm_port, offset.inv())
+        supervisor.start(offset)
+        self._supervisor = supervisor
+
+    def _reading(self, supervisor: Supervisor) -> Reading:
+        streamed = self._egm.fresh() if self._egm is not None else None
+        if streamed is not None:
+            return streamed
+        if supervisor.newest is None or supervisor.silent_s > self._settings.silence_s:
+            raise DeviceUnreachable(
+                self._named(
+                    f"no robot state for {supervisor.silent_s:.1f} s. The arm was told to stop. "
+                    "Check the network and the controller, then connect again"
+                )
+            )
+        return supervisor.newest
+
+    def _connected(self) -> Supervisor:
+        if self._supervisor is None:
+            raise DeviceUnreachable(self._named("not connected"))
+        return self._supervisor
+
+    def _named(self, what: str) -> str:
+        return f"ABB arm {self._url}: {what}"
+
+
+def _motion(supervisor: Supervisor) -> Motion:
+    if supervisor.fault is not None:
+        return Motion.STOPPED_BY_FAULT
+    return Motion.MOVING if supervisor.busy else Motion.STEADY

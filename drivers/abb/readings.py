@@ -1,0 +1,71 @@
+"""Readings of the arm: by polling Robot Web Services, or from EGM's stream."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from drivers.abb.units import transform_of
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the controller told of the arm.
+
+    Attributes
+    ----------
+    host_t_s:
+        Host clock (`time.monotonic`) when it was complete.
+    controller_t_s:
+        The controller's clock; None from RWS, which tells none.
+    joints_rad:
+        Six joint angles.
+    base_from_flange:
+        Pose of tool0 in the base frame, which is the flange's.
+    external:
+        The six external axes as the controller gives them, to be sent back unchanged.
+    configuration:
+        cf1, cf4, cf6, cfx.
+    raw:
+        The values in ABB's units, for the log.
+    """
+
+    host_t_s: float
+    controller_t_s: float | None
+    joints_rad: tuple[float, ...]
+    base_from_flange: RigidTransform
+    external: tuple[float, ...]
+    configuration: tuple[float, ...]
+    raw: dict[str, Any]
+
+
+def read_rws(rws: Any, now_s: float) -> Reading:
+    """Ask for joints and flange pose, in two requests; they are of one instant if it stands."""
+    joints = rws.get_jointtarget()
+    pose = rws.get_robtarget(tool="tool0", wobj="wobj0", coordinate="Base")
+    return Reading(
+        host_t_s=now_s,
+        controller_t_s=None,
+        joints_rad=tuple(np.radians(joints.robax).tolist()),
+        base_from_flange=transform_of(pose.trans, pose.rot),
+        external=tuple(joints.extax.tolist()),
+        configuration=tuple(pose.robconf.tolist()),
+        raw={
+            "source": "rws",
+            "jointtarget_deg": joints.robax.tolist(),
+            "trans_mm": pose.trans.tolist(),
+            "rot_wxyz": pose.rot.tolist(),
+        },
+    )
+
+
+def world_from_base(rws: Any) -> RigidTransform:
+    """Return where the base stands in the world, which work objects and EGM refer to."""
+    poses = {}
+    for frame in ("Base", "World"):
+        target = rws.get_robtarget(tool="tool0", wobj="wobj0", coordinate=frame)
+        poses[frame] = transform_of(target.trans, target.rot)
+    return poses["World"] * poses["Base"].inv()

@@ -1,0 +1,47 @@
+"""What can be set about an ABB arm."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+IRB140_LIMITS_RAD = tuple(
+    (math.radians(low), math.radians(high))
+    for low, high in ((-180, 180), (-90, 110), (-230, 50), (-200, 200), (-115, 115), (-400, 400))
+)
+"""ABB, "Product specification IRB 140", working range."""
+
+
+@dataclass(frozen=True)
+class ABBSettings:
+    """Settings of one arm; the defaults fit an IRB 140 on an IRC5.
+
+    Attributes
+    ----------
+    user, password:
+        Of Robot Web Services; ABB's own defaults.
+    poll_s:
+        Between two readings. Each takes three requests, and the controller bears fewer than
+        twenty a second.
+    silence_s:
+        Without a fresh reading for so long, the link counts as lost and the arm is told to stop.
+    connect_timeout_s, read_timeout_s:
+        Of every request.
+    egm_port:
+        UDP port where the controller's EGM feedback is to arrive; None for no EGM.
+    joint_limits_rad:
+        Lowest and highest angle of each joint.
+    max_joint_speed_rad_s, max_tcp_speed_m_s:
+        A target that asks for more is refused.
+    """
+
+    user: str = "Default User"
+    password: str = "robotics"
+    poll_s: float = 0.2
+    silence_s: float = 1.0
+    connect_timeout_s: float = 0.5
+    read_timeout_s: float = 0.8
+    egm_port: int | None = None
+    joint_limits_rad: tuple[tuple[float, float], ...] = IRB140_LIMITS_RAD
+    max_joint_speed_rad_s: float = 3.14
+    max_tcp_speed_m_s: float = 1.0

@@ -1,0 +1,125 @@
+"""Two ways to stop the arm: from a thread of this process, and from the guard's process.
+
+Both hold sessions that are logged in, and neither waits for whatever else is being asked of the
+controller. See `drivers.abb.guard` for what they send.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import requests
+
+from drivers.abb.guard import StopSession
+from drivers.abb.settings import ABBSettings
+from drivers.errors import DeviceUnreachable
+
+_GUARD = Path(__file__).with_name("guard.py")
+_ANSWER_S = 0.04
+_GUARD_START_S = 10.0
+
+
+class Stopper:
+    """Sends stops for one arm.
+
+    Attributes
+    ----------
+    failure:
+        None, or why the newest stop was not taken.
+    """
+
+    def __init__(self, url: str, settings: ABBSettings) -> None:
+        self._url = url
+        login = {
+            "url": url,
+            "user": settings.user,
+            "password": settings.password,
+            "timeout_s": settings.read_timeout_s,
+        }
+        self._session = StopSession(url, settings.user, settings.password, settings.read_timeout_s)
+        self._login = json.dumps(login)
+        self._guard: subprocess.Popen[str] | None = None
+        self._asked = threading.Event()
+        self._answered = threading.Event()
+        self._closing = False
+        self.failure: str | None = None
+        self._thread = threading.Thread(target=self._serve, name="abb-stop", daemon=True)
+
+    def open(self) -> None:
+        """Log in and start the guard; raises `DeviceUnreachable`."""
+        try:
+            self._session.log_in()
+        except requests.RequestException as error:
+            raise DeviceUnreachable(f"ABB arm {self._url}: {error}") from None
+        self._guard = subprocess.Popen(
+            [sys.executable, str(_GUARD)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            # an interrupt typed at the terminal must not take the guard along
+            start_new_session=True,
+        )
+        self._tell_guard(self._login)
+        self._await_guard(self._guard)
+        self._thread.start()
+
+    def order(self) -> None:
+        """Send the stop on both ways and wait briefly for an answer; `failure` tells of it."""
+        self.failure = None
+        self._answered.clear()
+        self._tell_guard("stop")
+        self._asked.set()
+        self._answered.wait(_ANSWER_S)
+
+    def close(self) -> None:
+        """Stop the arm and end the guard."""
+        self._closing = True
+        self._asked.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=5.0)
+        if self._guard is not None:
+            self._end_guard(self._guard)
+
+    def _serve(self) -> None:
+        while not self._closing:
+            self._asked.wait()
+            self._asked.clear()
+            self.failure = self._session.stop()
+            self._answered.set()
+
+    def _await_guard(self, guard: subprocess.Popen[str]) -> None:
+        assert guard.stdout is not None
+        late = threading.Timer(_GUARD_START_S, guard.kill)
+        late.start()
+        said = guard.stdout.readline()
+        late.cancel()
+        if said.strip() != "ready":
+            self._end_guard(guard)
+            raise DeviceUnreachable(
+                f"ABB arm {self._url}: the process that is to stop the arm should this one die "
+                "could not log in. Nothing moves without it"
+            )
+
+    def _tell_guard(self, line: str) -> None:
+        if self._guard is not None and self._guard.stdin is not None:
+            with contextlib.suppress(OSError, ValueError):
+                self._guard.stdin.write(line + "\n")
+                self._guard.stdin.flush()
+
+    @staticmethod
+    def _end_guard(guard: subprocess.Popen[str]) -> None:
+        for pipe in (guard.stdin, guard.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):
+                    pipe.close()
+        try:
+            guard.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            guard.kill()
+            guard.wait()

@@ -1,0 +1,215 @@
+"""The thread that polls the controller, passes on one order at a time, and stops on a fault.
+
+::
+
+    no order ── order() ──> starting ──> RAPID running ──> stopped at the target ──> no order
+        │                      │              │
+        └── fault, lost link, stop() ─────────┴──> stop on both ways, until RAPID has stopped
+
+A stop that falls between the requests of a start keeps the start from being sent; one that crosses
+it on the wire is sent again.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from drivers.abb.program import build_program, missed
+from drivers.abb.readings import Reading, read_rws
+from drivers.abb.rws import Cancelled, named, open_rws
+from drivers.abb.settings import ABBSettings
+from drivers.abb.status import failure_in_log, fault_in
+from drivers.abb.stopper import Stopper
+from drivers.arm import MoveTarget
+from drivers.errors import DeviceError, DeviceUnreachable
+
+_AT_REST_RAD = 1e-4
+_PANEL_EVERY = 5
+_STOP_CONFIRM_S = 2.0
+_START_S = 0.5  # between the answer to a start and the motion
+_START_ACTION = "rapid/execution?action=start"
+
+
+@dataclass
+class _Order:
+    target: MoveTarget
+    started_s: float | None = None
+
+
+class Supervisor:
+    """Owns the polling session, the stopper and the current order of one arm.
+
+    Attributes
+    ----------
+    fault:
+        None, or what stopped the arm.
+    stop_failed:
+        None, or why it is not known that the arm stopped when it was told to.
+    newest:
+        The newest reading.
+    """
+
+    def __init__(self, url: str, settings: ABBSettings) -> None:
+        self._url = url
+        self._settings = settings
+        self._rws = open_rws(url, settings, self._check_cancelled)
+        self._stopper = Stopper(url, settings)
+        self._lock = threading.RLock()
+        self._cancelled = threading.Event()
+        self._wake = threading.Event()
+        self._closing = False
+        self._order: _Order | None = None
+        self._stop_s: float | None = None
+        self._polls = 0
+        self._still = False
+        self.fault: str | None = None
+        self.stop_failed: str | None = None
+        self.newest: Reading | None = None
+        self.world_from_base = RigidTransform.identity()
+        self._thread = threading.Thread(target=self._run, name="abb-supervisor", daemon=True)
+
+    @property
+    def rws(self) -> Any:
+        """The polling session, for questions before `start`."""
+        return self._rws
+
+    @property
+    def busy(self) -> bool:
+        """Whether an order, or a stop, has not come to its end, or the arm moves for itself."""
+        return self._order is not None or self._stop_s is not None or not self._still
+
+    @property
+    def silent_s(self) -> float:
+        """Age of the newest reading."""
+        return np.inf if self.newest is None else time.monotonic() - self.newest.host_t_s
+
+    def start(self, world_from_base: RigidTransform) -> None:
+        """Log the stopper in, take the first readings, and begin to poll; raises `DeviceError`."""
+        self.world_from_base = world_from_base
+        self._stopper.open()
+        self._poll()
+        self._poll()
+        self._thread.start()
+
+    def order(self, target: MoveTarget) -> None:
+        """Take an order; the thread passes it on."""
+        with self._lock:
+            self._cancelled.clear()
+            self._order = _Order(target)
+        self._wake.set()
+
+    def stop(self) -> str | None:
+        """Stop the arm; return why the stop was not taken, or None."""
+        self._cancelled.set()
+        self._stopper.order()
+        with self._lock:
+            self._order = None
+            self._stop_s = time.monotonic()
+        self._wake.set()
+        return self._stopper.failure
+
+    def close(self) -> None:
+        """Stop the arm and end the thread."""
+        self._closing = True
+        self._cancelled.set()
+        self._wake.set()
+        self._stopper.close()
+        if self._thread.is_alive():
+            self._thread.join(timeout=5.0)
+
+    def _check_cancelled(self, method: str, address: str) -> None:
+        if _START_ACTION in address and (self._cancelled.is_set() or self._closing):
+            raise Cancelled(method)
+
+    def _run(self) -> None:
+        while not self._closing:
+            try:
+                self._begin_order()
+                self._poll()
+                self._judge()
+            except Cancelled:
+                continue
+            except DeviceUnreachable as error:
+                if self.silent_s > self._settings.silence_s:
+                    self._trip(str(error))
+            except DeviceError as error:
+                self._trip(str(error))
+            except Exception as error:
+                # nobody would watch the arm any more: whatever it is, stop first
+                self._trip(f"the driver's supervision failed: {error!r}")
+            self._wake.wait(self._settings.poll_s)
+            self._wake.clear()
+
+    def _begin_order(self) -> None:
+        order, reading = self._order, self.newest
+        if order is None or order.started_s is not None or reading is None:
+            return
+        from abb_motion_program_exec import abb_motion_program_exec_client as client
+
+        program = build_program(order.target, reading, self.world_from_base)
+        with named(self._url):
+            executor = client.MotionProgramExecClient(abb_client=self._rws)
+            executor.execute_motion_program(program, wait=False)
+        order.started_s = time.monotonic()
+        if self._cancelled.is_set():
+            self._stopper.order()
+
+    def _poll(self) -> None:
+        with named(self._url):
+            running = self._rws.get_execution_state().ctrlexecstate == "running"
+            reading = read_rws(self._rws, time.monotonic())
+            if self._polls % _PANEL_EVERY == 0:
+                panel = fault_in(self._rws)
+                if panel is not None:
+                    self._trip(panel)
+        self._polls += 1
+        before = self.newest
+        moved = before is None or _apart(before, reading) > _AT_REST_RAD
+        self.newest, self._still = reading, not (running or moved)
+
+    def _judge(self) -> None:
+        with self._lock:
+            self._see_stop_through()
+            order, reading = self._order, self.newest
+            if order is None or order.started_s is None or reading is None or not self._still:
+                return
+            off = missed(order.target, reading)
+            if off is not None and time.monotonic() - order.started_s < _START_S:
+                return
+            self._order = None
+        if off is not None:
+            self._trip(self._reason(off))
+
+    def _see_stop_through(self) -> None:
+        if self._stop_s is None:
+            return
+        assert self.newest is not None
+        if self._still and self.newest.host_t_s > self._stop_s:
+            self._stop_s = self.stop_failed = None
+            return
+        self._stopper.order()
+        if time.monotonic() - self._stop_s > _STOP_CONFIRM_S:
+            self.stop_failed = f"it still moves {_STOP_CONFIRM_S:g} s after it was told to stop"
+
+    def _reason(self, off: str) -> str:
+        with named(self._url):
+            panel = fault_in(self._rws)
+            if panel is not None:
+                return panel
+            failure = failure_in_log(self._rws)
+        return f"the motion ended {off} from its target ({failure or 'no reason logged'})"
+
+    def _trip(self, fault: str) -> None:
+        if self.fault is None:
+            self.fault = fault
+            self.stop()
+
+
+def _apart(a: Reading, b: Reading) -> float:
+    return float(np.abs(np.subtract(a.joints_rad, b.joints_rad)).max())

@@ -1,0 +1,5 @@
+"""An ABB IRC5 controller on loopback."""
+
+from sim.peers.abb.controller import ABBController, Event
+
+__all__ = ["ABBController", "Event"]

@@ -1,0 +1,170 @@
+"""An ABB IRC5 controller (RobotWare 6) on loopback: RWS 1.0 over HTTP, EGM feedback over UDP."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+
+from drivers.arm import Arm, Motion, MoveTarget
+from drivers.errors import DeviceError, SafetyError
+from sim.peers.abb.egm import EgmSender
+from sim.peers.abb.event_log import EventLog
+from sim.peers.abb.http_server import RwsServer
+from sim.peers.abb.motion_program import BadProgram, Wait, decode
+
+RAMDISK = "RAMDISK"
+PROGRAM_FILE = f"{RAMDISK}/motion_program.bin"
+_POLL_S = 0.004
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that reached the controller, on the host's monotonic clock."""
+
+    t_s: float
+    what: str
+
+
+@dataclass
+class PanelState:
+    """``controller`` is RWS's ctrlstate, ``mode`` its opmode."""
+
+    controller: str = "motoron"
+    mode: str = "AUTO"
+
+
+@dataclass
+class ABBFaults:
+    """``mute``: requests are read and never answered; ``stop_refused``: 403 to every stop."""
+
+    mute: bool = False
+    stop_refused: bool = False
+
+
+class ABBController:
+    """The controller of one simulated arm; a context manager that opens and closes its ports.
+
+    Parameters
+    ----------
+    arm:
+        The arm it moves, in process.
+    address:
+        A loopback address of its own.
+    port:
+        For HTTP; the real controller's is 80, which an ordinary user may not open.
+    egm_port:
+        Where to send EGM feedback while a program runs; None for nowhere.
+    """
+
+    def __init__(
+        self, arm: Arm, address: str = "127.0.0.1", port: int = 8610, egm_port: int | None = None
+    ) -> None:
+        self.arm = arm
+        self.address = address
+        self.port = port
+        self.panel = PanelState()
+        self.faults = ABBFaults()
+        self.files: dict[str, bytes] = {}
+        self.log = EventLog()
+        self.events: list[Event] = []
+        self.running = False
+        self._egm = EgmSender(self, (address, egm_port)) if egm_port else None
+        self._stop_rapid = threading.Event()
+        self._program: threading.Thread | None = None
+        self._lock = threading.RLock()
+
+    def __enter__(self) -> ABBController:
+        self.arm.connect()
+        self._http = RwsServer(self)
+        if self._egm is not None:
+            self._egm.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.kill()
+
+    @property
+    def url(self) -> str:
+        """Base URL of Robot Web Services."""
+        return f"http://{self.address}:{self.port}"
+
+    # ---- what a test orders ------------------------------------------------------------------
+
+    def guard_stop(self) -> None:
+        """Somebody opens the gate."""
+        self._safety_stop("guardstop")
+
+    def emergency_stop(self) -> None:
+        """Somebody hits the red button."""
+        self._safety_stop("emergencystop")
+
+    def to_manual(self) -> None:
+        """Somebody turns the key."""
+        self.panel.mode = "MANR"
+        self._safety_stop("guardstop")
+
+    def kill(self) -> None:
+        """The controller dies: ports closed, brakes on."""
+        self.faults.mute = False
+        self._http.close()
+        if self._egm is not None:
+            self._egm.close()
+        self.stop("controller killed")
+
+    def drop(self) -> None:
+        """Close every connection and keep accepting."""
+        self._http.drop()
+
+    def _safety_stop(self, state: str) -> None:
+        self.panel.controller = state
+        self.stop(state)
+
+    # ---- what its ports order ----------------------------------------------------------------
+
+    def note(self, what: str) -> None:
+        """Remember that something arrived."""
+        self.events.append(Event(time.monotonic(), what))
+
+    def start(self) -> None:
+        """Start RAPID at the program pointer."""
+        with self._lock:
+            self.running = True
+            self._stop_rapid.clear()
+            self._program = threading.Thread(target=self._run, name="rapid", daemon=True)
+            self._program.start()
+
+    def stop(self, why: str) -> None:
+        """Stop RAPID and the arm."""
+        with self._lock:
+            self._stop_rapid.set()
+            if self.arm.state().motion is Motion.MOVING:
+                self.note(f"halt: {why}")
+            self.arm.stop()
+            program = self._program
+        if program is not None:
+            program.join(timeout=1.0)
+
+    def _run(self) -> None:
+        name = f"log-{time.time_ns()}.bin".replace("_", "-")
+        self.log.add(1, "Motion Program Log File Opened", name)
+        try:
+            for command in decode(self.files.get(PROGRAM_FILE, b"")):
+                self._execute(command)
+        except (BadProgram, SafetyError, DeviceError, IndexError) as error:
+            self.log.add(3, "Motion Program Failed", str(error), "", "", "")
+        else:
+            self.files[f"{RAMDISK}/{name}"] = b""
+            self.log.add(1, "Motion Program Log File Closed", name)
+        self.running = False
+
+    def _execute(self, command: MoveTarget | Wait) -> None:
+        if isinstance(command, Wait):
+            self._stop_rapid.wait(command.duration_s)
+            return
+        with self._lock:
+            if self._stop_rapid.is_set():
+                return
+            self.arm.start_move(command)
+        while self.arm.state().motion is Motion.MOVING and not self._stop_rapid.is_set():
+            time.sleep(_POLL_S)

@@ -1,0 +1,68 @@
+"""EGM feedback: while a program runs, the controller sends joints and pose over UDP.
+
+Source: ABB, "Application manual, Externally Guided Motion"; protocol buffers as in its egm.proto.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+from ABBRobotEGM._egm_protobuf import egm_pb2
+
+from drivers.abb.units import millimetres, scalar_first
+
+if TYPE_CHECKING:
+    from sim.peers.abb.controller import ABBController
+
+_PERIOD_S = 0.008
+
+
+class EgmSender:
+    """Sends one message a period to one address."""
+
+    def __init__(self, controller: ABBController, target: tuple[str, int]) -> None:
+        self._controller = controller
+        self._target = target
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._send, name="egm", daemon=True)
+        self._number = 0
+
+    def start(self) -> None:
+        """Begin to send."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Send no more."""
+        self._closing.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=1.0)
+
+    def _send(self) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            while not self._closing.wait(_PERIOD_S):
+                if self._controller.running and not self._controller.faults.mute:
+                    with contextlib.suppress(OSError):
+                        link.sendto(self._message(), self._target)
+
+    def _message(self) -> bytes:
+        state = self._controller.arm.state()
+        message = egm_pb2.EgmRobot()
+        self._number += 1
+        message.header.seqno = self._number
+        message.header.tm = int(time.monotonic() * 1000) % 2**32
+        message.header.mtype = egm_pb2.EgmHeader.MSGTYPE_DATA
+        joints = np.degrees(state.joints_rad or ())
+        message.feedBack.joints.joints.extend(joints.tolist())
+        x, y, z = millimetres(state.base_from_flange)
+        position = message.feedBack.cartesian.pos
+        position.x, position.y, position.z = x, y, z
+        turn = message.feedBack.cartesian.orient
+        turn.u0, turn.u1, turn.u2, turn.u3 = scalar_first(state.base_from_flange)
+        message.motorState.state = egm_pb2.EgmMotorState.MOTORS_ON
+        message.rapidExecState.state = egm_pb2.EgmRapidCtrlExecState.RAPID_RUNNING
+        return bytes(message.SerializeToString())

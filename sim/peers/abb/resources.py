@@ -1,0 +1,144 @@
+"""What each RWS resource of the controller answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drivers.abb.units import millimetres, scalar_first
+
+if TYPE_CHECKING:
+    from sim.peers.abb.controller import ABBController
+
+_UNUSED_AXIS = "9E+09"
+_FILES = "fileservice/"
+_RAMDISK = "RAMDISK"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Status and body of an HTTP answer; bytes are sent as they are, the rest as JSON."""
+
+    status: int
+    body: Any = b""
+
+
+def state(*entries: dict[str, Any]) -> Answer:
+    """Return an answer with RWS's envelope."""
+    return Answer(200, {"_links": {}, "_embedded": {"_state": list(entries)}})
+
+
+def error(status: int, code: int, message: str) -> Answer:
+    """Return an answer that refuses."""
+    return Answer(status, {"_embedded": {"status": {"code": code, "msg": message}}})
+
+
+class Resources:
+    """Answers requests for one controller."""
+
+    def __init__(self, controller: ABBController) -> None:
+        self._controller = controller
+        units = "rw/motionsystem/mechunits/ROB_1"
+        self._gets: dict[str, Callable[[], Answer]] = {
+            "rw/system": lambda: state({"_type": "sys-system", "rwversion": "6.14.00.01"}),
+            "rw/panel/ctrlstate": lambda: state({"ctrlstate": controller.panel.controller}),
+            "rw/panel/opmode": lambda: state({"opmode": controller.panel.mode}),
+            "rw/rapid/execution": self._execution,
+            "rw/rapid/tasks": self._tasks,
+            "rw/elog/0": lambda: state(*controller.log.entries()),
+            "ctrl/$RAMDISK": lambda: state({"_type": "ctrl-env", "_value": _RAMDISK}),
+            f"{units}/jointtarget": self._jointtarget,
+            f"{units}/robtarget": self._robtarget,
+        }
+        self._posts: dict[tuple[str, str], Callable[[], Answer]] = {
+            ("rw/rapid/execution", "start"): self._start,
+            ("rw/rapid/execution", "stop"): self._stop,
+            ("rw/rapid/execution", "resetpp"): lambda: Answer(204),
+            ("rw/rapid/tasks/T_ROB1", "activate"): lambda: Answer(204),
+            ("rw/panel/ctrlstate", "setctrlstate"): self._motors_off,
+        }
+
+    @property
+    def mute(self) -> bool:
+        """Whether requests are to hang."""
+        return self._controller.faults.mute
+
+    def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> Answer:
+        """Return what a request gets."""
+        if path.startswith(_FILES):
+            return self._file(method, path.removeprefix(_FILES), body)
+        if method == "GET" and path in self._gets:
+            return self._gets[path]()
+        action = (path, query.get("action", ""))
+        if method == "POST" and action in self._posts:
+            return self._posts[action]()
+        return error(404, -1073445865, f"no such resource: {path}")
+
+    def _execution(self) -> Answer:
+        running = "running" if self._controller.running else "stopped"
+        return state({"_type": "rap-execution", "ctrlexecstate": running, "cycle": "once"})
+
+    def _tasks(self) -> Answer:
+        return state(
+            {
+                "_type": "rap-task-li",
+                "name": "T_ROB1",
+                "type": "normal",
+                "taskstate": "linked",
+                "excstate": "ready",
+                "active": "On",
+                "motiontask": "TRUE",
+            }
+        )
+
+    def _jointtarget(self) -> Answer:
+        joints = np.degrees(self._controller.arm.state().joints_rad or ())
+        entry = {f"rax_{i}": f"{angle:.6f}" for i, angle in enumerate(joints, 1)}
+        entry |= {f"eax_{letter}": _UNUSED_AXIS for letter in "abcdef"}
+        return state({"_type": "ms-jointtarget", **entry})
+
+    def _robtarget(self) -> Answer:
+        pose = self._controller.arm.state().base_from_flange
+        entry = dict(zip("xyz", (f"{v:.5f}" for v in millimetres(pose)), strict=True))
+        entry |= {f"q{i}": f"{v:.9f}" for i, v in enumerate(scalar_first(pose), 1)}
+        entry |= {"cf1": "0", "cf4": "0", "cf6": "0", "cfx": "0"}
+        entry |= {f"eax{letter}": _UNUSED_AXIS for letter in "abcdef"}
+        return state({"_type": "ms-robtargets", **entry})
+
+    def _start(self) -> Answer:
+        controller = self._controller
+        controller.note("rws: start")
+        if controller.panel.mode != "AUTO" or controller.panel.controller != "motoron":
+            return error(403, -1073442809, "operation not allowed in this controller state")
+        if controller.running:
+            return error(403, -1073442812, "RAPID is executing")
+        controller.start()
+        return Answer(204)
+
+    def _stop(self) -> Answer:
+        self._controller.note("rws: stop")
+        if self._controller.faults.stop_refused:
+            return error(403, -1073442809, "operation not allowed in this controller state")
+        self._controller.stop("rws stop")
+        return Answer(204)
+
+    def _motors_off(self) -> Answer:
+        self._controller.note("rws: motors off")
+        self._controller.panel.controller = "motoroff"
+        self._controller.stop("motors off")
+        return Answer(204)
+
+    def _file(self, method: str, name: str, body: bytes) -> Answer:
+        files = self._controller.files
+        if method == "PUT":
+            files[name] = body
+            return Answer(201)
+        if name not in files:
+            return error(404, -1073414146, f"no such file: {name}")
+        if method == "DELETE":
+            del files[name]
+            return Answer(204)
+        return Answer(200, files[name])
