@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from scipy.spatial.transform import RigidTransform
 
 from drivers.arm import Arm, Motion, MoveTarget
 from drivers.errors import DeviceError, SafetyError
@@ -55,6 +57,15 @@ class ABBController:
         For HTTP; the real controller's is 80, which an ordinary user may not open.
     egm_port:
         Where to send EGM feedback while a program runs; None for nowhere.
+
+    Attributes
+    ----------
+    world_from_base:
+        Where the arm is mounted; work objects and EGM refer to the world.
+    flange_from_active_tool:
+        What RWS takes for the tool where a request names none.
+    events, request_times_s:
+        Orders and halts of the arm; when each HTTP request came.
     """
 
     def __init__(
@@ -68,7 +79,10 @@ class ABBController:
         self.files: dict[str, bytes] = {}
         self.log = EventLog()
         self.events: list[Event] = []
+        self.request_times_s: list[float] = []
         self.running = False
+        self.world_from_base = RigidTransform.identity()
+        self.flange_from_active_tool = RigidTransform.identity()
         self._egm = EgmSender(self, (address, egm_port)) if egm_port else None
         self._stop_rapid = threading.Event()
         self._program: threading.Thread | None = None
@@ -158,6 +172,12 @@ class ABBController:
             self.log.add(1, "Motion Program Log File Closed", name)
         self.running = False
 
+    def _in_base(self, target: MoveTarget) -> MoveTarget:
+        if target.base_from_flange is None:
+            return target
+        pose = self.world_from_base.inv() * target.base_from_flange
+        return replace(target, base_from_flange=pose)
+
     def _execute(self, command: MoveTarget | Wait) -> None:
         if isinstance(command, Wait):
             self._stop_rapid.wait(command.duration_s)
@@ -165,6 +185,6 @@ class ABBController:
         with self._lock:
             if self._stop_rapid.is_set():
                 return
-            self.arm.start_move(command)
+            self.arm.start_move(self._in_base(command))
         while self.arm.state().motion is Motion.MOVING and not self._stop_rapid.is_set():
             time.sleep(_POLL_S)

@@ -58,11 +58,12 @@ class EgmSender:
         message.header.mtype = egm_pb2.EgmHeader.MSGTYPE_DATA
         joints = np.degrees(state.joints_rad or ())
         message.feedBack.joints.joints.extend(joints.tolist())
-        x, y, z = millimetres(state.base_from_flange)
+        pose = self._controller.world_from_base * state.base_from_flange
+        x, y, z = millimetres(pose)
         position = message.feedBack.cartesian.pos
         position.x, position.y, position.z = x, y, z
         turn = message.feedBack.cartesian.orient
-        turn.u0, turn.u1, turn.u2, turn.u3 = scalar_first(state.base_from_flange)
+        turn.u0, turn.u1, turn.u2, turn.u3 = scalar_first(pose)
         message.motorState.state = egm_pb2.EgmMotorState.MOTORS_ON
         message.rapidExecState.state = egm_pb2.EgmRapidCtrlExecState.RAPID_RUNNING
         return bytes(message.SerializeToString())

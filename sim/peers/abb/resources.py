@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -42,6 +43,7 @@ class Resources:
     def __init__(self, controller: ABBController) -> None:
         self._controller = controller
         units = "rw/motionsystem/mechunits/ROB_1"
+        self._robtarget_path = f"{units}/robtarget"
         self._gets: dict[str, Callable[[], Answer]] = {
             "rw/system": lambda: state({"_type": "sys-system", "rwversion": "6.14.00.01"}),
             "rw/panel/ctrlstate": lambda: state({"ctrlstate": controller.panel.controller}),
@@ -51,7 +53,6 @@ class Resources:
             "rw/elog/0": lambda: state(*controller.log.entries()),
             "ctrl/$RAMDISK": lambda: state({"_type": "ctrl-env", "_value": _RAMDISK}),
             f"{units}/jointtarget": self._jointtarget,
-            f"{units}/robtarget": self._robtarget,
         }
         self._posts: dict[tuple[str, str], Callable[[], Answer]] = {
             ("rw/rapid/execution", "start"): self._start,
@@ -68,8 +69,11 @@ class Resources:
 
     def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> Answer:
         """Return what a request gets."""
+        self._controller.request_times_s.append(time.monotonic())
         if path.startswith(_FILES):
             return self._file(method, path.removeprefix(_FILES), body)
+        if method == "GET" and path == self._robtarget_path:
+            return self._robtarget(query)
         if method == "GET" and path in self._gets:
             return self._gets[path]()
         action = (path, query.get("action", ""))
@@ -100,8 +104,12 @@ class Resources:
         entry |= {f"eax_{letter}": _UNUSED_AXIS for letter in "abcdef"}
         return state({"_type": "ms-jointtarget", **entry})
 
-    def _robtarget(self) -> Answer:
+    def _robtarget(self, query: dict[str, str]) -> Answer:
         pose = self._controller.arm.state().base_from_flange
+        if query.get("coordinate") != "Base":
+            pose = self._controller.world_from_base * pose
+        if query.get("tool") != "tool0":
+            pose = pose * self._controller.flange_from_active_tool
         entry = dict(zip("xyz", (f"{v:.5f}" for v in millimetres(pose)), strict=True))
         entry |= {f"q{i}": f"{v:.9f}" for i, v in enumerate(scalar_first(pose), 1)}
         entry |= {"cf1": "0", "cf4": "0", "cf6": "0", "cfx": "0"}

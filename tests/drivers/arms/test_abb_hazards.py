@@ -1,0 +1,297 @@
+"""What an IRC5, its library and the network can do to a run, and that the arm stops."""
+
+import random
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from benches import ABB_HOME, abb_peer, free_udp_port, quickly, slowly, until, wait_steady
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from calib.chain.kinematics import arm as kinematics_of
+from drivers.abb import ABBArm, ABBSettings
+from drivers.abb.program import build_program
+from drivers.abb.readings import Reading
+from drivers.arm import Motion, MoveTarget
+from drivers.errors import ArmStopped, DeviceError, DeviceRefused, DeviceUnreachable, StopFailed
+from sim.peers.abb.motion_program import decode
+
+GOAL_S = 0.1
+FAR = tuple(angle + 0.6 for angle in ABB_HOME)
+MOUNTED = RigidTransform.from_components([0.5, -0.2, 1.0], Rotation.from_rotvec([0, 0.3, 1.2]))
+
+
+@contextmanager
+def connected(egm=False, **settings):
+    port = free_udp_port() if egm else None
+    with abb_peer(port) as (controller, sim):
+        controller.world_from_base = MOUNTED
+        controller.flange_from_active_tool = RigidTransform.from_translation([0, 0, 0.2])
+        arm = ABBArm(controller.url, ABBSettings(egm_port=port, **settings))
+        try:
+            arm.connect()
+            yield arm, controller, sim
+        finally:
+            arm.close()
+
+
+@contextmanager
+def moving(egm=False, **settings):
+    with connected(egm, **settings) as (arm, controller, sim):
+        arm.start_move(slowly(FAR))
+        assert until(lambda: truly_moving(sim))
+        time.sleep(0.1)
+        yield arm, controller, sim
+
+
+def truly_moving(sim):
+    return np.abs(sim.truth().joint_velocity_rad_s).max() > 0
+
+
+def halted_s(controller, since_s):
+    def halts():
+        return [e.t_s for e in controller.events if e.what.startswith("halt") and e.t_s >= since_s]
+
+    assert until(lambda: bool(halts()), 3.0), controller.events
+    return halts()[0] - since_s
+
+
+def stays(sim, duration_s=0.4):
+    before = sim.truth().joints_rad
+    time.sleep(duration_s)
+    return np.abs(sim.truth().joints_rad - before).max() < 1e-9
+
+
+def test_a_stop_reaches_the_arm_within_100_ms_after_the_connections_were_dropped():
+    latencies_s = []
+    for _ in range(3):
+        with moving() as (arm, controller, sim):
+            controller.drop()
+            since_s = time.monotonic()
+            arm.stop()
+            latencies_s.append(halted_s(controller, since_s))
+            assert until(lambda sim=sim: not truly_moving(sim))
+            assert stays(sim, 0.2)
+        if latencies_s[-1] < GOAL_S:
+            return
+    raise AssertionError(latencies_s)
+
+
+def test_dropped_connections_are_made_again_and_the_move_ends_at_its_target():
+    with moving() as (arm, controller, _):
+        controller.drop()
+        state = wait_steady(arm)
+        assert state.fault is None
+        assert state.joints_rad == pytest.approx(FAR, abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_stop_at_any_instant_of_a_start_leaves_the_arm_standing(seed):
+    with connected() as (arm, _, sim):
+        arm.start_move(slowly(FAR))
+        time.sleep(random.Random(seed).uniform(0.0, 0.08))
+        arm.stop()
+        wait_steady(arm)
+        assert not truly_moving(sim)
+        assert stays(sim)
+
+
+_MOVE_AND_WAIT = """
+import sys, time
+from drivers.arm import MoveTarget
+from drivers.abb import ABBArm
+arm = ABBArm(sys.argv[1])
+arm.connect()
+arm.start_move(MoveTarget(joints_rad=tuple(map(float, sys.argv[2:])), joint_speed_rad_s=0.2,
+                          tcp_speed_m_s=0.5))
+print("moving", flush=True)
+time.sleep(60)
+"""
+
+
+def test_the_arm_stops_when_our_process_is_killed_on_the_way():
+    latencies_s = []
+    for _ in range(3):
+        with abb_peer() as (controller, sim):
+            command = [sys.executable, "-c", _MOVE_AND_WAIT, controller.url, *map(str, FAR)]
+            with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+                assert process.stdout.readline() == b"moving\n"
+                assert until(lambda sim=sim: truly_moving(sim))
+                since_s = time.monotonic()
+                process.kill()
+            latencies_s.append(halted_s(controller, since_s))
+            assert until(lambda sim=sim: not truly_moving(sim))
+            assert stays(sim)
+        if latencies_s[-1] < GOAL_S:
+            return
+    raise AssertionError(latencies_s)
+
+
+def test_a_controller_that_falls_silent_holds_nobody_up_and_is_told():
+    with moving() as (arm, controller, _):
+        controller.faults.mute = True
+        begin_s = time.monotonic()
+        arm.stop()
+        assert time.monotonic() - begin_s < 0.1
+        durations_s = []
+
+        def told():
+            call_s = time.monotonic()
+            try:
+                arm.state()
+            except (DeviceUnreachable, StopFailed):
+                return True
+            finally:
+                durations_s.append(time.monotonic() - call_s)
+            return False
+
+        assert until(told, 3.0)
+        assert max(durations_s) < 0.1
+        controller.faults.mute = False
+
+
+def test_a_dead_controller_fails_the_stop_loudly_and_at_once():
+    with moving() as (arm, controller, _):
+        controller.kill()
+        begin_s = time.monotonic()
+        with pytest.raises(StopFailed, match="emergency stop"):
+            arm.stop()
+        assert time.monotonic() - begin_s < 0.1
+        assert until(lambda: unreachable(arm), 3.0)
+
+
+def unreachable(arm):
+    try:
+        arm.state()
+    except (DeviceUnreachable, StopFailed):
+        return True
+    return False
+
+
+def test_a_refused_stop_switches_the_motors_off():
+    with moving() as (arm, controller, sim):
+        controller.faults.stop_refused = True
+        arm.stop()
+        assert until(lambda: not truly_moving(sim), 1.0)
+        assert controller.panel.controller == "motoroff"
+
+
+def test_a_wrong_password_is_told_as_such():
+    with (
+        abb_peer() as (controller, _),
+        pytest.raises(DeviceRefused, match="password"),
+    ):
+        ABBArm(controller.url, ABBSettings(password="guess")).connect()
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        (lambda controller: controller.to_manual(), "automatic"),
+        (lambda controller: controller.guard_stop(), "guard"),
+        (lambda controller: controller.emergency_stop(), "release the button"),
+    ],
+    ids=["manual", "guard", "emergency"],
+)
+def test_what_keeps_the_arm_from_moving_is_told_before_and_on_the_way(order, words):
+    with moving() as (arm, controller, sim):
+        order(controller)
+        assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT, 3.0)
+        assert words in arm.state().fault
+        assert stays(sim)
+        with pytest.raises(ArmStopped, match=words):
+            arm.connect()
+
+
+def test_a_running_rapid_program_is_not_disturbed():
+    with abb_peer() as (controller, _):
+        controller.running = True
+        with pytest.raises(DeviceRefused, match="RAPID program is running"):
+            ABBArm(controller.url).connect()
+
+
+def test_a_move_that_rapid_cannot_make_is_a_fault_with_its_words():
+    with connected() as (arm, _, sim):
+        far = RigidTransform.from_translation([5.0, 0.0, 0.0])
+        arm.start_move(MoveTarget(base_from_flange=far))
+        assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT, 3.0)
+        assert "flange" in arm.state().fault
+        assert not truly_moving(sim)
+
+
+def test_nobody_there_is_told_as_such():
+    with pytest.raises(DeviceUnreachable, match="OmniCore"):
+        ABBArm("http://127.255.255.254:8610").connect()
+
+
+def test_the_controller_is_asked_fewer_than_twenty_times_a_second():
+    with moving() as (_, controller, _):
+        begin_s = time.monotonic()
+        time.sleep(1.5)
+        asked = [t for t in controller.request_times_s if t > begin_s]
+        assert 5 < len(asked) / 1.5 < 20
+
+
+def test_a_pose_is_of_the_flange_in_the_base_wherever_the_arm_is_mounted():
+    with connected() as (arm, _, sim):
+        state = arm.state()
+        off = state.base_from_flange.inv() * sim.state().base_from_flange
+        assert np.linalg.norm(off.translation) < 1e-6
+        goal = RigidTransform.from_translation([0.02, 0.01, -0.03]) * state.base_from_flange
+        arm.start_move(MoveTarget(base_from_flange=goal))
+        assert wait_steady(arm).fault is None
+        off = sim.state().base_from_flange.inv() * goal
+        assert np.linalg.norm(off.translation) < 1e-6
+
+
+def test_egm_tells_joints_and_flange_pose_of_one_instant_on_the_way():
+    forward = kinematics_of("irb140").forward
+    with moving(egm=True) as (arm, _, _):
+        clocks = set()
+        for _ in range(30):
+            state = arm.state()
+            assert state.raw["source"] == "egm"
+            expected = RigidTransform.from_matrix(forward(np.array(state.joints_rad)))
+            off = state.base_from_flange.inv() * expected
+            # the mounting comes from RWS, which prints quaternions to nine digits
+            assert np.linalg.norm(off.translation) < 1e-7
+            clocks.add(state.controller_t_s)
+            time.sleep(0.01)
+        assert len(clocks) > 15
+
+
+def test_an_egm_port_in_use_is_told_as_such():
+    with connected(egm=True) as (arm, controller, _):
+        settings = ABBSettings(egm_port=arm._settings.egm_port)
+        with pytest.raises(DeviceRefused, match="UDP port"):
+            ABBArm(controller.url, settings).connect()
+
+
+def test_a_program_says_what_was_asked_for_to_single_precision():
+    pose = RigidTransform.from_components([0.4, -0.1, 0.5], Rotation.from_rotvec([1, 2, 0.3]))
+    reading = Reading(0.0, None, ABB_HOME, pose, (9e9,) * 6, (0.0,) * 4, {})
+    asked = MoveTarget(joints_rad=FAR, tcp_speed_m_s=0.2, joint_speed_rad_s=0.3)
+    [read] = decode(build_program(asked, reading, MOUNTED).get_program_bytes())
+    assert read.joints_rad == pytest.approx(FAR, abs=1e-7)
+    assert read.tcp_speed_m_s == pytest.approx(0.2)
+    assert read.joint_speed_rad_s == pytest.approx(0.3)
+    asked = MoveTarget(base_from_flange=pose)
+    [read] = decode(build_program(asked, reading, MOUNTED).get_program_bytes())
+    off = read.base_from_flange.inv() * (MOUNTED * pose)
+    assert np.linalg.norm(off.translation) < 1e-7
+    assert off.rotation.magnitude() < 1e-6
+
+
+def test_moving_again_after_a_guard_stop_needs_a_new_connection():
+    with moving() as (arm, controller, _):
+        controller.guard_stop()
+        assert until(lambda: arm.state().fault is not None, 3.0)
+        controller.panel.controller = "motoron"
+        with pytest.raises(DeviceError):
+            arm.start_move(quickly(ABB_HOME))
+        arm.connect()
+        arm.start_move(quickly(ABB_HOME))
+        assert wait_steady(arm).joints_rad == pytest.approx(ABB_HOME, abs=1e-5)
