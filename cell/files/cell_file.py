@@ -38,8 +38,9 @@ class SimulatedRobot(Part):
     """An arm in this process."""
 
     driver: Literal["sim"] = "sim"
-    model: str
-    """Kinematic model: ur3, ur3e, ur5, ur5e, ur10, ur10e, ur16e, irb140."""
+    model: str | None
+    """Kinematic model: ur3, ur3e, ur5, ur5e, ur10, ur10e, ur16e, irb140; null where it is unknown,
+    for a cell that is simulated at logged poses and never moved."""
     payload_kg: float = Field(default=0.0, ge=0)
     """Mass of camera and bracket at the flange."""
 
@@ -133,6 +134,8 @@ class Layout(Part):
     """Joint angles to start from and to plan around."""
     distances_m: tuple[Positive, Positive]
     """Nearest and farthest distance of the board's centre from the camera worth planning."""
+    alpha_px: Positive | None = None
+    """The camera's scale factor to a few percent; from lens and pixel size where it is null."""
 
 
 class EffectFile(Part):
@@ -140,7 +143,8 @@ class EffectFile(Part):
 
     name: str
     law: str | None = None
-    parameters: dict[str, Finite] = Field(default_factory=dict)
+    parameters: dict[str, Finite | tuple[Finite, ...]] = Field(default_factory=dict)
+    """By name, with the unit in it; a list stands for the numbered parameters of that stem."""
 
 
 class Noise(Part):
@@ -152,10 +156,21 @@ class Noise(Part):
     """Repeatability of the flange's position, per axis."""
     arm_rotation_rad: float = Field(default=0.0, ge=0)
     """Repeatability of the flange's rotation, per axis."""
-    read_levels: float = Field(default=0.0, ge=0)
+    read_levels: float = Field(default=0.5, ge=0)
     """The sensor's read noise, in levels of an 8-bit image."""
-    full_well_electrons: Positive | None = None
-    """Photons are counted in these; without it there is no photon noise."""
+    full_well_electrons: Positive | None = 10_000.0
+    """Electrons at which a pixel is full; null for light without photon noise."""
+
+
+class SimulatedLens(Part):
+    """What the picture's sharpness follows from."""
+
+    best_blur_px: float = Field(default=0.5, ge=0)
+    """Blur at best focus, Gaussian sigma."""
+    focus_distance_m: Positive | None = None
+    """Where the lens stands focused at first; at the board, as the first pose sees it, if null."""
+    nearest_focus_m: Positive = 0.1
+    """Nearest distance of the focus drive."""
 
 
 class Simulation(Part):
@@ -166,11 +181,14 @@ class Simulation(Part):
     fixed: Pose
     """As in `layout`, exactly."""
     optics: dict[str, Finite]
-    """Columns of the chain's optics: alpha_px, beta_px, u0_px, v0_px, k1, k2, ..."""
+    """Columns of the chain's optics: alpha_px, beta_px, skew_px, u0_px, v0_px, k1, k2, ..."""
     effects: tuple[EffectFile, ...] = ()
     """What a plain model leaves out."""
     noise: Noise = Noise()
-    seed: int = 0
+    lens: SimulatedLens = SimulatedLens()
+    white_exposure_s: Positive = 0.012
+    """Exposure at which a white board is just not saturated: how well the cell is lit."""
+    seed: int = Field(default=0, ge=0)
 
 
 class CellFile(Part):

@@ -141,7 +141,8 @@ class PlanFile(Part):
     def as_mapping(self) -> dict[str, Any]:
         """Plain dicts and lists, keys as in the file, defaults left out."""
         data = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
-        return {"schema": SCHEMA, **data}
+        first = {"schema": SCHEMA, "name": self.name, "cell": data["cell"]}
+        return first | {"speed_m_s": self.speed_m_s} | data
 
 
 @dataclass(frozen=True)

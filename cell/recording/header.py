@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt
-from ruamel.yaml import YAML
 
 from calib.views import Board, Mount
+from cell.files.writing import yaml_text
 from cell.files.yaml_model import read_model
 
 SCHEMA: Final = "cell.recording/1"
@@ -132,4 +132,4 @@ def read_header(folder: Path) -> Header:
 def write_header(folder: Path, header: Header) -> None:
     """Write a new `recording.yaml`; raises `FileExistsError` rather than overwrite one."""
     with (folder / FILE_NAME).open("x", encoding="utf-8") as file:
-        YAML().dump(header.as_mapping(), file)
+        file.write(yaml_text(header.as_mapping()))

@@ -46,11 +46,13 @@ class Guard:
     @cached_property
     def kinematics(self) -> ArmKinematics:
         """The arm's kinematics; raises `InputError` for a model nobody knows."""
+        model = self.cell.robot.model
         try:
-            return arm(self.cell.robot.model)
+            return arm(model or "")
         except UnknownArm:
             raise InputError(
-                f"robot.model: {self.cell.robot.model} is not known; known are {', '.join(MODELS)}"
+                f"cell {self.cell.name}: robot.model: {model} is not known; known are"
+                f" {', '.join(MODELS)}"
             ) from None
 
     @cached_property

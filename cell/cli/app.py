@@ -1,0 +1,51 @@
+"""The `cell` command: its verbs, and every error as words and an exit status."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable
+
+import typer
+
+from cell.cli.calibrate import calibrate
+from cell.cli.plan import plan
+from cell.cli.run import run
+from cell.cli.simulate import simulate
+from cell.errors import EXIT_OPERATOR, exit_status_of
+
+app = typer.Typer(
+    name="cell",
+    help="Calibrate a camera on a robot, and name the physics a plain model leaves out.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+VERBS: dict[str, Callable[..., None]] = {
+    "run": run,
+    "plan": plan,
+    "simulate": simulate,
+    "calibrate": calibrate,
+}
+    "run": run,
+    "plan": plan,
+    "simulate": simulate,
+    "calibrate": calibrate,
+}
+for name, verb in VERBS.items():
+    app.command(name)(verb)
+
+
+def main() -> None:
+    """Run the command line and leave with the contract's exit status."""
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s: %(message)s")
+    try:
+        app()
+    except KeyboardInterrupt:
+        sys.stderr.write("stopped\n")
+        sys.exit(EXIT_OPERATOR)
+    except Exception as error:
+        status = exit_status_of(error)
+        if status is None:
+            raise
+        sys.stderr.write(f"error: {error}\n")
+        sys.exit(status)

@@ -1,0 +1,31 @@
+"""`cell calibrate`: from a recording to a calibration and its report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cell.cli.output import JsonFlag, show
+
+
+def calibrate(
+    recording: Annotated[Path, typer.Argument(help="A recording's folder.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for the results.")
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Calibrate a recording; writes calibration.json and report.html."""
+    from cell.calibrate import calibrate_into
+    from cell.cli.progress import picture_progress
+    from cell.cli.summary import calibration_summary
+    from cell.recording import read_recording
+
+    source = read_recording(recording)
+    simulated = bool((source.header.model_extra or {}).get("simulated"))
+    with picture_progress() as progress:
+        calibrated, folder = calibrate_into(source, output, progress=progress, simulated=simulated)
+    text = f"{calibration_summary(calibrated.mapping)}\nreport: {folder / 'report.html'}"
+    show(text, calibrated.mapping, as_json=as_json)

@@ -1,0 +1,32 @@
+"""What verbs print: results on stdout, everything else on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+JsonFlag = Annotated[
+    bool, typer.Option("--json", help="Print the result as one JSON object on stdout.")
+]
+
+
+def show(text: str, result: Mapping[str, Any], *, as_json: bool) -> None:
+    """Print a verb's result, for people or for programs."""
+    sys.stdout.write((json.dumps(result, default=str) if as_json else text) + "\n")
+
+
+def say(text: str) -> None:
+    """Tell the operator something that is not the result."""
+    sys.stderr.write(text + "\n")
+
+
+def new_folder(name: str) -> Path:
+    """A folder under `runs/` for results whose place was not given."""
+    words = "".join(c if c.isalnum() or c in "-_" else "-" for c in name).strip("-")
+    return Path("runs") / f"{words}-{time.strftime('%Y%m%d-%H%M%S')}"

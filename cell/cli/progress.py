@@ -1,0 +1,69 @@
+"""A run's progress: a bar with the time left in a terminal, a plain line per frame elsewhere."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from cell.sequencer.sequencer import Listener
+from cell.sequencer.states import Status
+
+
+@contextmanager
+def run_progress(*, simulated: bool) -> Iterator[Listener]:
+    """A listener that shows a run on stderr."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield _tell_plainly
+        return
+    bar = Progress(
+        TextColumn("[yellow]SIMULATED" if simulated else "[green]REAL ARM"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[left]}"),
+        TextColumn("{task.description}"),
+        console=console,
+    )
+    with bar:
+        task = bar.add_task("", left="", total=None)
+
+        def tell(status: Status) -> None:
+            bar.update(
+                task,
+                total=status.total,
+                completed=status.done + status.skipped,
+                description=f"{status.state.value} {status.view}",
+                left=f"{_clock(status.left_s)} left",
+            )
+            if status.event:
+                console.print(status.event, highlight=False)
+
+        yield tell
+
+
+def _tell_plainly(status: Status) -> None:
+    if status.event:
+        done = f"[{status.done + status.skipped}/{status.total}]"
+        sys.stderr.write(f"{done} {status.event}, {_clock(status.left_s)} left\n")
+        sys.stderr.flush()
+
+
+def _clock(seconds: float | None) -> str:
+    return "?:??" if seconds is None else f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+
+@contextmanager
+def picture_progress() -> Iterator[Callable[[int, int], None]]:
+    """Told (done, total) while pictures are searched for the board."""
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("finding corners", total=None)
+
+        def tell(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        yield tell

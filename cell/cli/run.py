@@ -1,0 +1,64 @@
+"""`cell run`: move, grab and log, then calibrate, diagnose and report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cell.cli.output import JsonFlag, new_folder, say, show
+from cell.errors import InputError
+
+DEFAULT_PLAN = Path(__file__).parents[1] / "defaults" / "irb140-eosens.plan.yaml"
+
+
+def run(
+    plan: Annotated[Path | None, typer.Argument(help="The plan; a dry run has a default.")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Simulated arm and camera in place of the real ones.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder of the recording and results.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the recording in that folder.")
+    ] = False,
+    record_only: Annotated[
+        bool, typer.Option("--record-only", help="Do not calibrate and diagnose afterwards.")
+    ] = False,
+    as_json: JsonFlag = False,
+) -> None:
+    """Move, grab and log every view of a plan, then calibrate, diagnose and report."""
+    from cell.run import Outcome, evaluate, record
+
+    path = _plan_path(plan, dry_run)
+    folder = _folder(path, output, resume)
+    if dry_run:
+        say(f"SIMULATED arm and camera; plan {path}; recording {folder}")
+    result = record(path, folder, dry_run=dry_run, resume=resume)
+    outcome = Outcome.of(result, folder)
+    for view, reason in result.skipped.items():
+        say(f"skipped view {view}: {reason}")
+    if outcome.complete and not record_only:
+        outcome = evaluate(outcome, result, simulated=dry_run)
+    show(outcome.text, outcome.mapping, as_json=as_json)
+    if result.reason:
+        say(f"error: {result.reason}")
+    raise typer.Exit(result.finish.exit_status)
+
+
+def _plan_path(plan: Path | None, dry_run: bool) -> Path:
+    if plan is not None:
+        return plan
+    if not dry_run:
+        raise InputError("name the plan to run, or try the simulated cell: cell run --dry-run")
+    return DEFAULT_PLAN
+
+
+def _folder(plan: Path, output: Path | None, resume: bool) -> Path:
+    if output is not None:
+        return output
+    if resume:
+        raise InputError("--resume needs -o with the folder of the recording to go on with")
+    return new_folder(plan.name.split(".")[0])

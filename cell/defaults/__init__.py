@@ -1,0 +1,1 @@
+"""Cells and plans that come with the program: links into configs/."""

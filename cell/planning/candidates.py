@@ -1,0 +1,107 @@
+"""Where the camera could stand: fronto-parallel series and tilted views of the board."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.stats import qmc
+
+from calib.views import Board, FloatArray
+from cell.errors import InputError
+from cell.files.cell_file import CellFile
+
+_EDGE = 0.03
+"""Share of the image kept free along every edge: the layout is known to a centimetre or two."""
+_ROLLS_RAD = np.radians([0.0, 180.0, 90.0, -90.0])
+TILT_RAD = (np.radians(12.0), np.radians(42.0))
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What the planned camera sees of the board.
+
+    Attributes
+    ----------
+    board, width_px, height_px, alpha_px:
+        The target, and a pinhole good enough to plan with.
+    """
+
+    board: Board
+    width_px: int
+    height_px: int
+    alpha_px: float
+
+    @classmethod
+    def of(cls, cell: CellFile) -> Sight:
+        """The sight of a cell; raises `InputError` where nothing tells its scale factor."""
+        camera = cell.camera
+        alpha_px = cell.layout.alpha_px if cell.layout else None
+        if alpha_px is None and camera.lens and camera.pixel_size_um:
+            alpha_px = 1e3 * camera.lens.focal_length_mm / camera.pixel_size_um
+        if alpha_px is None:
+            raise InputError(
+                f"cell {cell.name}: to plan poses one must know what the camera sees: write"
+                " layout.alpha_px, or camera.lens.focal_length_mm and camera.pixel_size_um"
+            )
+        return cls(cell.board.board(), camera.width, camera.height, alpha_px)
+
+    def whole(self, camera_from_board: RigidTransform) -> bool:
+        """Whether every corner, and half a square around, lie inside the image."""
+        corners = self.board.corners_m
+        border = 0.5 * self.board.square_m
+        low, high = corners.min(axis=0) - border, corners.max(axis=0) + border
+        outline = np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
+        x, y, z = camera_from_board.apply(outline).T
+        if (z <= 0).any():
+            return False
+        half = 0.5 - _EDGE
+        across = np.abs(self.alpha_px * x / z) <= half * self.width_px
+        down = np.abs(self.alpha_px * y / z) <= half * self.height_px
+        return bool((across & down).all())
+
+    def placed(
+        self, turn: Rotation, distance_m: float, aim: FloatArray | None = None
+    ) -> RigidTransform:
+        """camera_from_board with the board's centre `distance_m` deep, seen at `aim` (x/z, y/z)."""
+        x, y = (0.0, 0.0) if aim is None else aim
+        centre_in_board = self.board.corners_m.mean(axis=0)
+        centre_in_camera = distance_m * np.array([x, y, 1.0])
+        return RigidTransform.from_components(centre_in_camera - turn.apply(centre_in_board), turn)
+
+
+def parallel(sight: Sight, distance_m: float) -> Iterator[RigidTransform]:
+    """Fronto-parallel views (camera_from_board) at one distance, by preference of the roll."""
+    for roll in _ROLLS_RAD:
+        view = sight.placed(Rotation.from_rotvec([0.0, 0.0, roll]), distance_m)
+        if sight.whole(view):
+            yield view
+
+
+def varied(sight: Sight, distances_m: tuple[float, float], seed: int) -> Iterator[RigidTransform]:
+    """Endless tilted views (camera_from_board), spread evenly over what may vary."""
+    spread = qmc.Halton(5, seed=seed)
+    while True:
+        tilt, azimuth, roll, far, corner = spread.random()[0]
+        axis = np.array([np.cos(2 * np.pi * azimuth), np.sin(2 * np.pi * azimuth), 0.0])
+        turn = Rotation.from_rotvec((TILT_RAD[0] + tilt * np.ptp(TILT_RAD)) * axis)
+        turn = Rotation.from_rotvec([0.0, 0.0, 2 * np.pi * roll]) * turn
+        distance = distances_m[0] + far * (distances_m[1] - distances_m[0])
+        view = _pushed_aside(sight, turn, distance, 2 * np.pi * corner)
+        if view is not None:
+            yield view
+
+
+def _pushed_aside(
+    sight: Sight, turn: Rotation, distance_m: float, direction_rad: float
+) -> RigidTransform | None:
+    """The board as far towards the image's edge as it goes while it is whole."""
+    half = 0.5 * np.array([sight.width_px, sight.height_px]) / sight.alpha_px
+    towards = half * np.array([np.cos(direction_rad), np.sin(direction_rad)])
+    for share in np.linspace(0.9, 0.0, 10):
+        view = sight.placed(turn, distance_m, share * towards)
+        if sight.whole(view):
+            return view
+    return None

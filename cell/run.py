@@ -1,0 +1,101 @@
+"""A whole run: record a plan, calibrate and diagnose what was recorded, write the report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from calib.detection import Detection
+from cell.calibrate import calibrate_into, detect_corners
+from cell.cli.progress import run_progress
+from cell.cli.summary import calibration_summary
+from cell.factory import real_devices, simulated_devices
+from cell.files.plan_file import read_plan
+from cell.recording import Corners, Recording, read_recording, write_corners
+from cell.recording.corners import FILE_NAME as DETECTIONS
+from cell.sequencer.session import record_plan
+from cell.sequencer.states import Finish, RunResult
+
+
+def record(plan_path: Path, folder: Path, *, dry_run: bool, resume: bool) -> RunResult:
+    """Run a plan into a recording, with its progress in the terminal.
+
+    Raises
+    ------
+    InputError, SafetyError
+        Plan or cell cannot be used, or a recording is in the way.
+    """
+    plan = read_plan(plan_path)
+    devices = simulated_devices(plan) if dry_run else real_devices(plan)
+    with run_progress(simulated=dry_run) as listener:
+        return record_plan(
+            plan, folder, devices, simulated=dry_run, resume=resume, listener=listener
+        )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run came to.
+
+    Attributes
+    ----------
+    complete:
+        Every view was taken or given up: there is something to calibrate.
+    text, mapping:
+        For people, and for programs.
+    """
+
+    folder: Path
+    complete: bool
+    text: str
+    mapping: dict[str, Any]
+
+    @classmethod
+    def of(cls, result: RunResult, folder: Path) -> Outcome:
+        """The outcome of recording alone."""
+        mapping = {
+            "finish": result.finish.name.lower(),
+            "reason": result.reason or None,
+            "recording": str(folder),
+            "frames": result.frames,
+            "skipped": [{"view": view, "reason": why} for view, why in result.skipped.items()],
+        }
+        lost = f", {len(result.skipped)} views skipped" if result.skipped else ""
+        text = f"{result.finish.words}: {result.frames} frames{lost} in {folder}"
+        complete = result.finish in (Finish.COMPLETED, Finish.COMPLETED_WITH_LOSSES)
+        return cls(folder, complete, text, mapping)
+
+
+def evaluate(outcome: Outcome, result: RunResult, *, simulated: bool) -> Outcome:
+    """Calibrate a finished run and write its report; results go into the recording's folder.
+
+    Raises
+    ------
+    BadAnswer
+        No calibration is possible.
+    """
+    recording = read_recording(outcome.folder)
+    if not recording.has_detections:
+        corners = corners_of_run(recording, result.detections)
+        write_corners(outcome.folder / DETECTIONS, corners, recording.board)
+    calibrated, folder = calibrate_into(recording, outcome.folder, simulated=simulated)
+    report = folder / "report.html"
+    return replace(
+        outcome,
+        text=f"{outcome.text}\n{calibration_summary(calibrated.mapping)}\nreport: {report}",
+        mapping=outcome.mapping
+        | {"calibration": str(folder / "calibration.json"), "report": str(report)},
+    )
+
+
+def corners_of_run(recording: Recording, found: dict[int, Detection]) -> Corners:
+    """The boards that the run's own checks found; the other frames' pictures are searched."""
+    left = tuple(frame for frame in recording.frames if frame.frame not in found)
+    rest = detect_corners(replace(recording, frames=left)) if left else Corners({})
+    return Corners(
+        px={**rest.px, **{n: d.corners_px for n, d in found.items()}},
+        sigma_px={**rest.sigma_px, **{n: d.sigma_px for n, d in found.items()}},
+        blur_px={**rest.blur_px, **{n: d.frame_blur_px for n, d in found.items()}},
+        rejected=rest.rejected,
+    )
