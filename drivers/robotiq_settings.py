@@ -71,7 +71,7 @@ class RobotiqSettings:
         """
         if setting.mode not in MODES:
             raise DeviceRefused(f"focus mode '{setting.mode}' is none of {', '.join(MODES)}")
-        if not self.supported:
+        if not (self.supported and "focusAuto" in self.read(deadline_s)):
             if setting.mode == "hold":
                 return None
             raise DeviceRefused(f"focus mode '{setting.mode}': {NO_SETTINGS}")

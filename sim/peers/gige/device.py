@@ -16,7 +16,7 @@ import threading
 import time
 from types import TracebackType
 
-from drivers.camera import Camera
+from drivers.camera import Camera, FocusSetting
 from sim.peers.gige import features as ft
 from sim.peers.gige import gvcp
 from sim.peers.gige.gvcp import Command, Refused, Status
@@ -44,13 +44,14 @@ class GigEPeer:
     Parameters
     ----------
     source:
-        Where pictures come from; must be connected. Exposure, gain and focus are passed on to it.
+        Where pictures come from. Exposure, gain and focus are passed on to it; what it has of them
+        at first is what the device has after power-on.
     width, height:
         Sensor size, pixels; `source` gives pictures of that size.
     address:
         Any loopback address (127.0.0.0/8); the control port is always 3956.
-    focus_steps, focus_start, focus_steps_s:
-        Range, start and speed of the lens's stepper.
+    focus_steps, focus_steps_s:
+        Range and speed of the lens's stepper; None for a lens without one.
     link_bytes_s:
         Rate of the link; 125e6 is Gigabit Ethernet.
     answer_discovery_broadcast:
@@ -66,8 +67,7 @@ class GigEPeer:
         address: str = "127.0.0.1",
         model: str = "SimulatedCamera",
         serial: str = "SIM-0001",
-        focus_steps: int = 10000,
-        focus_start: int = 5000,
+        focus_steps: int | None = 10000,
         focus_steps_s: float = 20000.0,
         link_bytes_s: float = 125e6,
         answer_discovery_broadcast: bool = False,
@@ -78,7 +78,8 @@ class GigEPeer:
         self.address, self.faults = address, Faults()
         self._source, self._size = source, (width, height)
         self._names = (model, serial)
-        self._focus = (focus_steps, focus_start, focus_steps_s)
+        self._focus = focus_steps, focus_steps_s
+        self._at_power_on: tuple[dict[str, float], int | None] | None = None
         self._link, self._seed = link_bytes_s, seed
         self._broadcast = answer_discovery_broadcast
         self._sockets: list[socket.socket] = []
@@ -86,11 +87,15 @@ class GigEPeer:
 
     def start(self) -> GigEPeer:
         """Power on: default registers, nobody in control, block ids from one."""
-        steps, start, steps_s = self._focus
-        features = ft.device_features(*self._size, steps, start)
+        steps, steps_s = self._focus
+        values, step = self._reset_source()
+        features = ft.device_features(*self._size)
+        features += ft.optic_features(steps) if steps is not None else ()
         self.registers = RegisterMap(features, self.address, *self._names)
+        self.registers.set("ExposureTime", values["exposure_s"] * 1e6)
+        self.registers.set("Gain", values["gain_db"])
         self.streamer = Streamer(self._source, self.address, self.faults, self._link, self._seed)
-        self._lens = Lens(self._source, self.streamer.order, start, steps_s)
+        self._lens = Lens(self._source, self.streamer.order, step or 0, steps_s)
         self.registers.set_word(0x0D1C, self.streamer.port)
         self._controller: tuple[str, int] | None = None
         self._heard_s = 0.0
@@ -101,6 +106,18 @@ class GigEPeer:
         self._thread = threading.Thread(target=self._serve, daemon=True, name="gige control")
         self._thread.start()
         return self
+
+    def _reset_source(self) -> tuple[dict[str, float], int | None]:
+        self._source.connect()
+        if self._at_power_on is None:
+            position = self._source.focus(FocusSetting("hold"))
+            step = None if position is None else round(position)
+            self._at_power_on = dict(self._source.configure()), step
+        values, step = self._at_power_on
+        self._source.configure(**values)
+        if step is not None and self._focus[0] is not None:
+            self._source.focus(FocusSetting("position", float(step)))
+        return values, step
 
     def kill(self) -> None:
         """Cut the power: no answer, no packet, no goodbye. Idempotent."""

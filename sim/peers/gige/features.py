@@ -17,7 +17,7 @@ STREAM_PACKET_DELAY = 0x0D08
 TICK_FREQUENCY = 0x093C
 HEARTBEAT_TIMEOUT = 0x0938
 
-Value = int | float | str
+Value = int | float
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Feature:
     Attributes
     ----------
     kind:
-        `integer`, `float`, `enumeration`, `command` or `string`.
+        `integer`, `float`, `enumeration` or `command`.
     access:
         RO, RW or WO.
     default, low, high, unit:
@@ -55,29 +55,25 @@ class Feature:
     @property
     def length(self) -> int:
         """Bytes of its register."""
-        return {"float": 8, "string": 32}.get(self.kind, 4)
+        return 8 if self.kind == "float" else 4
 
     def pack(self, value: Value) -> bytes:
         """A value as the register holds it."""
         if self.kind == "float":
             return struct.pack(">d", value)
-        if self.kind == "string":
-            return str(value).encode().ljust(self.length, b"\0")
         return struct.pack(">I", value)
 
     def unpack(self, data: bytes) -> Value:
         """The value that register bytes stand for."""
         if self.kind == "float":
             return float(struct.unpack(">d", data)[0])
-        if self.kind == "string":
-            return data.rstrip(b"\0").decode()
         return int.from_bytes(data, "big")
 
     def allows(self, value: Value) -> bool:
         """Whether the device takes that value."""
         if self.kind == "enumeration":
             return value in self.entries.values()
-        if isinstance(value, str) or self.low is None or self.high is None:
+        if self.low is None or self.high is None:
             return True
         return self.low <= value <= self.high
 
@@ -91,9 +87,9 @@ def _enumeration(name: str, category: str, entries: dict[str, int], **kw: object
     return Feature(name, category, "enumeration", entries=entries, **options)  # type: ignore[arg-type]
 
 
-def device_features(width: int, height: int, steps: int, start_step: int) -> tuple[Feature, ...]:
-    """The features of a camera of that size (pixels) whose lens has `steps` focus steps."""
-    image, acquisition, optic = "ImageFormatControl", "AcquisitionControl", "OpticControl"
+def device_features(width: int, height: int) -> tuple[Feature, ...]:
+    """The features of a camera of that size, pixels."""
+    image, acquisition = "ImageFormatControl", "AcquisitionControl"
     transport, info = "TransportLayerControl", "DeviceControl"
     return (
         Feature("DeviceTemperature", info, "float", 35.0, unit="C", access="RO"),
@@ -112,21 +108,28 @@ def device_features(width: int, height: int, steps: int, start_step: int) -> tup
         _enumeration("TriggerMode", acquisition, {"Off": 0, "On": 1}),
         _enumeration("TriggerSource", acquisition, {"Software": 0, "Line0": 1}, default=1),
         Feature("TriggerSoftware", acquisition, "command", access="WO"),
-        Feature("ExposureTime", acquisition, "float", 10000.0, 10.0, 2e6, "us"),
+        Feature("ExposureTime", acquisition, "float", 10000.0, 10.0, 1e6, "us"),
         _enumeration("ExposureAuto", acquisition, _OFF_ONCE_CONTINUOUS, default=2),
         Feature("Gain", "AnalogControl", "float", 0.0, 0.0, 24.0, "dB"),
         _enumeration("GainAuto", "AnalogControl", _OFF_ONCE_CONTINUOUS, default=2),
+        Feature("PayloadSize", transport, "integer", width * height, access="RO"),
+        _fixed("GevSCPSPacketSize", STREAM_PACKET_SIZE),
+        _fixed("GevSCPD", STREAM_PACKET_DELAY),
+        _fixed("GevHeartbeatTimeout", HEARTBEAT_TIMEOUT),
+    )
+
+
+def optic_features(steps: int) -> tuple[Feature, ...]:
+    """The features of a motorised lens with so many focus steps."""
+    optic = "OpticControl"
+    return (
         _enumeration("OpticControllerSelector", optic, {"OpticController0": 0}),
         _enumeration("OpticControllerStatus", optic, OPTIC_STATUS, access="RO"),
         Feature("OpticControllerInitialize", optic, "command", access="WO"),
         _enumeration("FocusStatus", optic, OPTIC_STATUS, access="RO"),
         Feature("FocusInitialize", optic, "command", access="WO"),
-        Feature("FocusStepper", optic, "integer", start_step, 0, steps),
+        Feature("FocusStepper", optic, "integer", 0, 0, steps),
         _enumeration("FocusAuto", optic, {"Off": 0, "Once": 1}),
-        Feature("PayloadSize", transport, "integer", width * height, access="RO"),
-        _fixed("GevSCPSPacketSize", STREAM_PACKET_SIZE),
-        _fixed("GevSCPD", STREAM_PACKET_DELAY),
-        _fixed("GevHeartbeatTimeout", HEARTBEAT_TIMEOUT),
     )
 
 

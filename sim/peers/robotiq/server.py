@@ -22,7 +22,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera import Camera
+from drivers.camera import Camera, FocusSetting
+from drivers.errors import DeviceError
 from sim.peers.robotiq.settings import Settings
 
 
@@ -57,9 +58,11 @@ class RobotiqPeer:
     Parameters
     ----------
     source:
-        Where pictures come from; must be connected. Exposure, gain and focus are passed on to it.
+        Where pictures come from. Exposure, gain and focus are passed on to it.
     has_settings:
         Whether this firmware answers `getcamerasettings` and `setcamerasettings`.
+    autofocus_period_s:
+        How often a lens that focuses by itself looks again.
     frame_rate_hz:
         Rate of the video; between two frames the same JPEG file is given again.
     """
@@ -72,19 +75,25 @@ class RobotiqPeer:
         port: int = 0,
         has_settings: bool = True,
         frame_rate_hz: float = 30.0,
+        autofocus_period_s: float = 1.0,
     ) -> None:
         if not ipaddress.IPv4Address(address).is_loopback:
             raise ValueError(f"{address} is no loopback address: this server stays on loopback")
         self.faults = RobotiqFaults()
-        self.settings = Settings() if has_settings else None
+        self.settings: Settings
+        self.has_settings = has_settings
         self.display_size: tuple[int, int] | None = None
         self._source, self._period_s = source, 1 / frame_rate_hz
+        self._autofocus_period_s, self._focused_s = autofocus_period_s, -1e9
         self._where = address, port
         self._lock = threading.Lock()
         self._picture, self._taken_s = b"", -1e9
 
     def start(self) -> RobotiqPeer:
         """Listen and answer, in threads of its own."""
+        self._source.connect()
+        position = self._source.focus(FocusSetting("hold"))
+        self.settings = Settings(self._source.configure(), position)
         self._server = _Server(self._where, _Handler)
         self._server.peer = self
         self._where = self._server.server_address[0:2]  # type: ignore[assignment]
@@ -124,21 +133,25 @@ class RobotiqPeer:
 
     def change(self, wanted: dict[str, Any]) -> None:
         """Take over settings and pass exposure, gain and focus on to the source."""
-        if self.settings is None:
-            raise KeyError("no settings")
         if self.faults.ignore_focus_lock:
             wanted = {**wanted, "focusAuto": True}
         with self._lock:
-            self.settings.change(wanted)
-            self._source.configure(
-                exposure_s=self.settings.exposure_s, gain_db=self.settings.gain_db
-            )
-            focus = self.settings.focus_order
-            position = self._source.focus(focus)
-            if focus.mode == "auto" and position is not None:
-                self.settings.values["focus"] = int(np.clip(round(position), 0, 1023))
+            new = self.settings.changed(wanted)
+            self._source.configure(exposure_s=new.exposure_s, gain_db=new.gain_db)
+            old, self.settings = self.settings, new
+            if _focus_of(new) != _focus_of(old):
+                self._focus()
+
+    def _focus(self) -> None:
+        position = self._source.focus(self.settings.focus_order)
+        self._focused_s = time.monotonic()
+        if position is not None:
+            self.settings.set_focus(position)
 
     def _take(self) -> bytes:
+        looked_s = time.monotonic() - self._focused_s
+        if self.settings.focuses_itself and looked_s > self._autofocus_period_s:
+            self._focus()
         taken = self._source.grab(timeout_s=60.0).image
         shift = 8 if taken.dtype == np.uint16 else 0
         image: NDArray[np.uint8] = (taken.astype(np.uint16) >> shift).astype(np.uint8)
@@ -148,6 +161,10 @@ class RobotiqPeer:
             )
         _, encoded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 95])
         return encoded.tobytes()
+
+
+def _focus_of(settings: Settings) -> dict[str, Any]:
+    return {name: value for name, value in settings.values.items() if name.startswith("focus")}
 
 
 class _Server(http.server.ThreadingHTTPServer):
@@ -174,7 +191,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         match url.path:
             case "/current.jpg":
                 self._answer(peer.picture(), "image/jpeg")
-            case "/getcamerasettings" if peer.settings:
+            case "/getcamerasettings" if peer.has_settings:
                 document = {"cameraSettings": peer.settings.values}
                 self._answer(json.dumps(document).encode(), "application/json")
             case "/setdisplaysize":
@@ -186,11 +203,15 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         body = self.rfile.read(int(self.headers["Content-Length"]))
-        if urlsplit(self.path).path != "/setcamerasettings" or not self.server.peer.settings:
+        if urlsplit(self.path).path != "/setcamerasettings" or not self.server.peer.has_settings:
             self.send_error(404)
             return
-        self.server.peer.change(json.loads(body)["cameraSettings"])
-        self._answer(b"", "text/plain")
+        try:
+            self.server.peer.change(json.loads(body)["cameraSettings"])
+        except DeviceError as error:
+            self.send_error(400, str(error))
+        else:
+            self._answer(b"", "text/plain")
 
     def _answer(self, body: bytes, kind: str) -> None:
         faults = self.server.peer.faults

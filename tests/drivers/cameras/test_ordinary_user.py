@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -24,17 +25,19 @@ CHOSEN = (
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="all tests already run as an ordinary user")
 @pytest.mark.skipif(shutil.which("setpriv") is None, reason="setpriv (util-linux) is missing")
-def test_no_frame_is_lost_by_an_ordinary_user(tmp_path: Path) -> None:
+def test_no_frame_is_lost_by_an_ordinary_user() -> None:
     tests = [f"{HERE}/test_gige_faults.py", f"{HERE}/test_conformance.py", "-k", CHOSEN]
-    done = subprocess.run(
-        ["setpriv", *NOBODY, sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *tests],
-        cwd=ROOT,
-        env={"PATH": os.environ["PATH"], "PYTHONDONTWRITEBYTECODE": "1", "HOME": "/nonexistent"},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    with tempfile.TemporaryDirectory() as home:
+        Path(home).chmod(0o777)
+        done = subprocess.run(
+            ["setpriv", *NOBODY, sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *tests],
+            cwd=ROOT,
+            env={"PATH": os.environ["PATH"], "PYTHONDONTWRITEBYTECODE": "1", "HOME": home},
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
     if "Permission denied" in done.stderr and done.returncode not in (0, 1):
         pytest.skip(f"an ordinary user may not read {ROOT}")
     assert done.returncode == 0, done.stdout + done.stderr

@@ -36,7 +36,6 @@ def camera(peer: RobotiqPeer) -> Iterator[RobotiqCamera]:
 
 
 def test_autos_are_off_after_connecting(camera: RobotiqCamera, peer: RobotiqPeer) -> None:
-    assert peer.settings is not None
     assert peer.settings.values["exposureAuto"] is False
     assert peer.settings.values["whiteBalanceAuto"] is False
 
