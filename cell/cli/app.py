@@ -26,11 +26,6 @@ VERBS: dict[str, Callable[..., None]] = {
     "simulate": simulate,
     "calibrate": calibrate,
 }
-    "run": run,
-    "plan": plan,
-    "simulate": simulate,
-    "calibrate": calibrate,
-}
 for name, verb in VERBS.items():
     app.command(name)(verb)
 
