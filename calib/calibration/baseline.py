@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.calibration.frames import Usable, require_frames
-from calib.calibration.result import VALUES, Rejection, Solution
+from calib.calibration.result import VALUES, Covariance, Rejection, Solution
 from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
 from calib.errors import CalibrationError
 from calib.paper.extrinsics import board_poses
 from calib.paper.zhang import centred_camera_matrix, zhang_algebraic
 from calib.solver.free_poses import FreePoseFit, fit_free_poses
+from calib.solver.unknowns import PLAIN_OPTICS
 from calib.views import BoolArray, FloatArray, Views
 
 FRAME_OUTLIER = 6.0
@@ -49,6 +50,14 @@ class Baseline:
     weight: FloatArray
     rejected: tuple[Rejection, ...]
     missing: dict[str, str]
+
+    def without_skew(self, views: Views) -> Solution:
+        """Maximum likelihood with the skew at zero, as most other programs take it."""
+        row = self.mle.optics[np.flatnonzero(self.used)[0]].copy()
+        row[COLUMN["skew_px"]] = 0.0
+        poses = self.mle.camera_from_board
+        fit = fit_subset(views, self.used, row, poses, self.weight, PLAIN_OPTICS)
+        return as_solution(fit, self.weight, PLAIN_OPTICS)
 
 
 def fit_baseline(views: Views, usable: Usable) -> Baseline:
@@ -161,6 +170,7 @@ def as_solution(fit: FreePoseFit, weight: FloatArray, free: tuple[str, ...]) -> 
         residual_px=np.where(weight[..., None] > 0, fit.residual_px, np.nan),
         values={name: float(first[COLUMN[name]]) for name in VALUES},
         sigma={name: float(s) for name, s in zip(free, sigma, strict=True)},
+        covariance=Covariance(free, fit.covariance),
     )
 
 

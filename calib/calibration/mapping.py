@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from calib.calibration.result import (
     Calibration,
+    Covariance,
+    Focus,
     PositionError,
     RobotReference,
     Solution,
@@ -38,6 +40,8 @@ def as_mapping(calibration: Calibration, recording: str) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "recording": recording,
+        "image_size_px": list(c.image_size_px),
+        "distance_range_m": list(c.distance_range_m),
         "frames_used": [int(f) for f in c.frame[c.used]],
         "frames_rejected": [{"frame": r.frame, "reason": r.reason} for r in c.rejected],
         "scale_factors": [_scale_factor(f) for f in c.scale_factors],
@@ -94,11 +98,29 @@ def _solution(calibration: Calibration, name: str) -> dict[str, Any]:
     return {
         **solution.values,
         "at_distance_m": solution.at_distance_m,
+        "focus": None if solution.focus is None else _focus(solution.focus),
         "sigma": dict(solution.sigma),
+        "covariance": _covariance(calibration, solution.covariance),
         "reprojection_px": solution.reprojection_px,
         "camera_position_error_m": None if error is None else _position_error(name, error),
         "robot_consistency": None if error is None else _consistency(error),
     }
+
+
+def _focus(focus: Focus) -> dict[str, Any]:
+    return {"law": focus.law, "parameters": {n: dict(vars(p)) for n, p in focus.parameters.items()}}
+
+
+def _covariance(calibration: Calibration, found: Covariance | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    mount = "eye_in_hand" if calibration.robot is None else calibration.robot.mount
+    frames = dict(zip(("flange_from_mounted", "base_from_fixed"), _TRANSFORMS[mount], strict=True))
+    names = []
+    for name in found.names:
+        frame, _, axis = name.partition(".")
+        names.append(f"{frames[frame]}.{axis}" if frame in frames else name)
+    return {"names": names, "matrix": found.matrix.tolist()}
 
 
 def _statistics(error_m: FloatArray) -> dict[str, Any]:

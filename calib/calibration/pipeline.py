@@ -9,6 +9,7 @@ from calib.calibration.frames import usable_frames
 from calib.calibration.paper_method import PaperResult, board_depth_m, run_paper_method
 from calib.calibration.result import VALUES, Calibration, PositionError, Solution
 from calib.calibration.robot import RobotFit, fit_robot, hand_eye_of
+from calib.calibration.shared import joint_covariance, joint_focus
 from calib.chain.model import walk
 from calib.chain.optics import COLUMN
 from calib.errors import CalibrationError
@@ -53,6 +54,8 @@ def calibrate(views: Views) -> Calibration:
         missing |= paper.missing
         if robot.joint is not None:
             solutions["joint_ml"] = joint_solution(views, baseline, robot, robot.joint)
+    if "joint_ml" not in solutions:
+        solutions["zhang_mle_no_skew"] = baseline.without_skew(views)
     reference = None if robot is None else robot.reference
     return Calibration(
         frame=views.frame,
@@ -66,7 +69,14 @@ def calibrate(views: Views) -> Calibration:
         robot=reference,
         position_error={} if robot is None else _position_errors(views, solutions, robot),
         missing=missing,
+        image_size_px=(views.width_px, views.height_px),
+        distance_range_m=_distance_range_m(views, baseline),
     )
+
+
+def _distance_range_m(views: Views, baseline: Baseline) -> tuple[float, float]:
+    depth = board_depth_m(views, baseline.mle.camera_from_board)[baseline.used]
+    return float(depth.min()), float(depth.max())
 
 
 def _robot(views: Views, baseline: Baseline, missing: dict[str, str]) -> RobotFit | None:
@@ -110,7 +120,7 @@ def joint_solution(views: Views, baseline: Baseline, robot: RobotFit, joint: Joi
     start[robot.taken] = state.camera_from_board
     fit = fit_subset(views, robot.taken, optics, start, baseline.weight, ())
     at = float(np.median(board_depth_m(views, fit.camera_from_board)[robot.taken]))
-    moving = robot.reference.law is not None
+    law = robot.reference.law
     middle = np.argmin(np.abs(state.distance_m - at))
     return Solution(
         optics=fit.optics,
@@ -118,7 +128,9 @@ def joint_solution(views: Views, baseline: Baseline, robot: RobotFit, joint: Joi
         residual_px=np.where(baseline.weight[..., None] > 0, fit.residual_px, np.nan),
         values={name: float(state.optics[middle, COLUMN[name]]) for name in VALUES},
         sigma={u.name: joint.sigma(u.name) for u in joint.unknowns if u.name in VALUES},
-        at_distance_m=float(state.distance_m[middle]) if moving else None,
+        at_distance_m=None if law is None else float(state.distance_m[middle]),
+        focus=joint_focus(joint, law),
+        covariance=joint_covariance(joint, law),
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.handeye import HandEye, chain
-from calib.paper.focus_law import FocusLaw, FocusLawChoice
+from calib.paper.focus_law import FocusLaw, FocusLawChoice, Parameter
 from calib.paper.scale_factors import ScaleFactor
 from calib.paper.zones import Zones
 from calib.views import BoolArray, FloatArray, Mount
@@ -46,6 +46,31 @@ class Statistics:
 
 
 @dataclass(frozen=True)
+class Covariance:
+    """(p, p) covariance of a fit's shared numbers, by name, in their own units."""
+
+    names: tuple[str, ...]
+    matrix: FloatArray
+
+
+@dataclass(frozen=True)
+class Focus:
+    """How one solution's focal lengths follow the distance.
+
+    Attributes
+    ----------
+    law:
+        `inverse_square` or `thin_lens`, as in `calib.paper.focus_law`.
+    parameters:
+        `alpha0_px`, `beta0_px`, `k_px_m2`, or `alpha_inf_px`, `beta_inf_px`, `f_m`; beta moves
+        by the same share as alpha.
+    """
+
+    law: str
+    parameters: Mapping[str, Parameter]
+
+
+@dataclass(frozen=True)
 class Solution:
     """One camera model with the poses it gives.
 
@@ -61,6 +86,10 @@ class Solution:
         Distance at which alpha and beta are told where they move, else None.
     values:
         The numbers of `VALUES`.
+    focus:
+        How alpha and beta move with distance where this solution's own fit tells, else None.
+    covariance:
+        Of the numbers that were fitted together, or None.
     """
 
     optics: FloatArray
@@ -69,6 +98,8 @@ class Solution:
     values: Mapping[str, float]
     sigma: Mapping[str, float]
     at_distance_m: float | None = None
+    focus: Focus | None = None
+    covariance: Covariance | None = None
 
     @property
     def reprojection_px(self) -> dict[str, float]:
@@ -159,6 +190,10 @@ class Calibration:
         The robot's side, and every solution's camera positions against it.
     missing:
         What could not be known, by name, and why.
+    image_size_px:
+        (width, height).
+    distance_range_m:
+        Nearest and farthest depth of the board's centre in the frames used.
     """
 
     frame: np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -172,3 +207,5 @@ class Calibration:
     robot: RobotReference | None
     position_error: Mapping[str, PositionError]
     missing: Mapping[str, str]
+    image_size_px: tuple[int, int]
+    distance_range_m: tuple[float, float]

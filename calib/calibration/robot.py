@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.calibration.result import RobotReference
+from calib.calibration.result import VALUES, RobotReference
 from calib.chain.effects import make_effect
 from calib.chain.model import CellModel, walk
 from calib.chain.optics import COLUMN
@@ -25,6 +25,13 @@ from calib.views import BoolArray, FloatArray, Views
 
 DECISIVE_AIC = 30.0
 """Far above chance: an arm with errors of its own bends the joint fit by some tens."""
+
+PICTURE_GAIN = 9.0
+"""Three sigmas, for a law with nothing free in it."""
+
+PICTURE_LOSS = -4.0
+REPEATABLE_M, REPEATABLE_RAD = 1e-4, 5e-4
+"""What data sheets promise: an arm whose scatter is below both has no errors worth a law."""
 
 _ALPHA_RANGE = 1.3
 _FOCUS_LAWS = ("inverse_square", "thin_lens")
@@ -129,17 +136,19 @@ def _without_skew(optics: FloatArray) -> FloatArray:
 def _best_lens(plain: CellModel, views: Views, noise: Noise) -> tuple[str | None, JointFit, float]:
     """The joint fit with the lens law the data prefer, and its gain in AIC over none.
 
-    A law must not make the pictures fit worse: an arm that is off bends the joint fit, too, and
-    the pictures know nothing of the arm.
+    An arm that is off bends the joint fit, too, and a law that bends likewise then gains. The
+    pictures know nothing of the arm: with free poses, they must bear the law out by themselves,
+    or, where the arm keeps to its repeatability, at least not speak against it.
     """
     still = _fit(plain, views, noise)
-    start = still.model
-    still_rms = _image_rms_px(still, views) * (1 + 1e-6)
     best: tuple[str | None, JointFit] = (None, still)
+    by_pictures = _picture_cost(still, still, views)
     for law in _FOCUS_LAWS:
         effect = make_effect("focus_breathing", {"law": law})
-        moving = _fit(start.with_effects([effect]), views, still.noise)
-        if _aic(moving) < _aic(best[1]) and _image_rms_px(moving, views) <= still_rms:
+        moving = _fit(still.model.with_effects([effect]), views, still.noise)
+        picture_gain = by_pictures - _picture_cost(moving, still, views)
+        enough = PICTURE_LOSS if _arm_is_true(moving) else PICTURE_GAIN
+        if picture_gain > enough and _aic(moving) < _aic(best[1]):
             best = (law, moving)
     gain = _aic(still) - _aic(best[1])
     return (*best, gain) if gain >= DECISIVE_AIC else (None, still, gain)
@@ -149,19 +158,24 @@ def _fit(model: CellModel, views: Views, noise: Noise) -> JointFit:
     return fit_joint(model, views, unknowns_of(model, PLAIN_OPTICS), noise)
 
 
-def _image_rms_px(fit: JointFit, views: Views) -> float:
-    """Residuals of a fit's camera with poses from the pictures alone."""
-    state, weight = walk(fit.model, views, flange_error=fit.flange_error), fit.weight
+def _arm_is_true(fit: JointFit) -> bool:
+    noise = fit.noise
+    return noise.flange_m < REPEATABLE_M and noise.flange_rad < REPEATABLE_RAD
+
+
+def _picture_cost(fit: JointFit, still: JointFit, views: Views) -> float:
+    """-2 log likelihood of the pictures alone: poses and camera free, the law's shape held."""
+    state = walk(fit.model, views, flange_error=fit.flange_error)
     free = fit_free_poses(
         state.optics,
         state.camera_from_board,
         state.points_m,
         views.corners_px,
-        (),
-        weight=weight,
+        VALUES,
+        weight=still.weight,
     )
-    weighted = np.nansum(free.residual_px**2, axis=2) * weight
-    return float(np.sqrt(weighted.sum() / weight.sum()))
+    square = np.nansum(free.residual_px**2, axis=2) * still.weight
+    return float(square.sum()) / still.noise.corner_px**2
 
 
 def _aic(fit: JointFit) -> float:
