@@ -9,6 +9,7 @@ from collections.abc import Callable
 import typer
 
 from cell.cli.calibrate import calibrate
+from cell.cli.importing import import_
 from cell.cli.plan import plan
 from cell.cli.run import run
 from cell.cli.simulate import simulate
@@ -25,6 +26,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "plan": plan,
     "simulate": simulate,
     "calibrate": calibrate,
+    "import": import_,
 }
 for name, verb in VERBS.items():
     app.command(name)(verb)

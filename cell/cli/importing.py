@@ -1,0 +1,97 @@
+"""`cell import`: images and poses of another tool, or a recording, into a new recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from calib.views import Mount
+from cell.cli.output import JsonFlag, new_folder, say, show
+from cell.errors import InputError
+from cell.importing import RotationName, Unit
+
+
+def import_(
+    source: Annotated[Path, typer.Argument(help="A recording, or a folder of pictures.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder of the new recording.")
+    ] = None,
+    board: Annotated[
+        str | None,
+        typer.Option(
+            help="ROWSxCOLSxSQUARE_M of a chessboard in inner corners (6x9x0.025), or"
+            " charuco:SQUARES_XxSQUARES_YxSQUARE_MxMARKER_M:DICTIONARY."
+        ),
+    ] = None,
+    poses: Annotated[
+        Path | None, typer.Option(help="File or folder of the flange's poses.")
+    ] = None,
+    rotation: Annotated[
+        RotationName | None, typer.Option(help="How the poses' rotations are written.")
+    ] = None,
+    unit: Annotated[Unit | None, typer.Option(help="Unit of the poses' positions.")] = None,
+    inverted: Annotated[
+        bool, typer.Option("--inverted", help="The poses are flange_from_base.")
+    ] = False,
+    mount: Annotated[Mount, typer.Option(help="Where the camera sits.")] = "eye_in_hand",
+    robot: Annotated[str | None, typer.Option(help="The arm's model, such as ur5e.")] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Turn images and poses of another tool's layout into a recording, corners found."""
+    from cell.cli.progress import picture_progress
+    from cell.importing.importer import Described, import_source
+
+    described = Described(
+        board=None if board is None else parse_board(board),
+        poses=poses,
+        rotation=rotation,
+        unit=unit,
+        inverted=inverted,
+        mount=mount,
+        robot=robot,
+    )
+    folder = output or new_folder(f"{source.resolve().name}-imported")
+    with picture_progress() as progress:
+        imported = import_source(source, folder, described, progress)
+    for guess in imported.guessed:
+        say(f"GUESSED: {guess}")
+    for frame, reason in imported.rejected.items():
+        say(f"no corners in frame {frame}: {reason}")
+    text = f"{folder}: {imported.frames} frames, the board found in {imported.with_corners}"
+    show(text, vars(imported), as_json=as_json)
+
+
+def parse_board(text: str) -> dict[str, Any]:
+    """A board as said on the command line, in the words of `recording.yaml`.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    try:
+        if text.startswith("charuco:"):
+            sizes, _, dictionary = text.removeprefix("charuco:").partition(":")
+            squares_x, squares_y, square, marker = sizes.split("x")
+            return {
+                "type": "charuco",
+                "squares_x": int(squares_x),
+                "squares_y": int(squares_y),
+                "square_m": float(square),
+                "marker_m": float(marker),
+                "dictionary": dictionary or "DICT_6X6_250",
+            }
+        rows, cols, square = text.split("x")
+        return {
+            "type": "chessboard",
+            "rows": int(rows),
+            "cols": int(cols),
+            "square_m": float(square),
+        }
+    except ValueError:
+        raise InputError(
+            f"--board {text}: is not understood; give ROWSxCOLSxSQUARE_M such as 6x9x0.025, or"
+            " charuco:5x7x0.036x0.018:DICT_6X6_250"
+        ) from None
