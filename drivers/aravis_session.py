@@ -93,6 +93,10 @@ class AravisFeatures:
         with self._errors():
             self._device.execute_command(name)
 
+    def release(self) -> None:
+        """Let go of the device: its destructor must run in the thread that closes the session."""
+        self._device = None
+
     def _errors(self) -> contextlib.AbstractContextManager[None]:
         return _named(self._name, self._glib)
 
@@ -182,7 +186,7 @@ class AravisSession:
             except (DeviceRefused, DeviceUnreachable) as error:
                 _log.debug("closing: %s", error)
         self._stream = self._device = self._camera = None
-        del self.features
+        self.features.release()
 
     def _open(self, address: str, control_wait_s: float) -> Any:
         deadline_s = time.monotonic() + control_wait_s
