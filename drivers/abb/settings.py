@@ -21,8 +21,8 @@ class ABBSettings:
     user, password:
         Of Robot Web Services; ABB's own defaults.
     poll_s:
-        Between two readings. Each takes three requests, and the controller bears fewer than
-        twenty a second.
+        Between two questions whether RAPID still runs; at rest, where the pose is asked for too,
+        it is twice as long. The controller bears fewer than twenty requests a second.
     silence_s:
         Without a fresh reading for so long, the link counts as lost and the arm is told to stop.
     connect_timeout_s, read_timeout_s:
@@ -37,7 +37,7 @@ class ABBSettings:
 
     user: str = "Default User"
     password: str = "robotics"
-    poll_s: float = 0.2
+    poll_s: float = 0.1
     silence_s: float = 1.0
     connect_timeout_s: float = 0.5
     read_timeout_s: float = 0.8

@@ -30,7 +30,7 @@ from drivers.arm import MoveTarget
 from drivers.errors import DeviceError, DeviceUnreachable
 
 _AT_REST_RAD = 1e-4
-_PANEL_EVERY = 5
+_PANEL_EVERY, _POSE_EVERY = 7, 4
 _STOP_CONFIRM_S = 2.0
 _START_S = 0.5  # between the answer to a start and the motion
 _START_ACTION = "rapid/execution?action=start"
@@ -67,7 +67,7 @@ class Supervisor:
         self._order: _Order | None = None
         self._stop_s: float | None = None
         self._polls = 0
-        self._still = False
+        self._still = self._running = False
         self.fault: str | None = None
         self.stop_failed: str | None = None
         self.newest: Reading | None = None
@@ -143,7 +143,7 @@ class Supervisor:
             except Exception as error:
                 # nobody would watch the arm any more: whatever it is, stop first
                 self._trip(f"the driver's supervision failed: {error!r}")
-            self._wake.wait(self._settings.poll_s)
+            self._wake.wait(self._pause_s())
             self._wake.clear()
 
     def _begin_order(self) -> None:
@@ -157,21 +157,33 @@ class Supervisor:
             executor = client.MotionProgramExecClient(abb_client=self._rws)
             executor.execute_motion_program(program, wait=False)
         order.started_s = time.monotonic()
+        self._still = False
         if self._cancelled.is_set():
             self._stopper.order()
 
     def _poll(self) -> None:
+        """Ask whether RAPID runs, and for the pose: always at rest, now and then on the way."""
         with named(self._url):
-            running = self._rws.get_execution_state().ctrlexecstate == "running"
-            reading = read_rws(self._rws, time.monotonic())
+            self._running = self._rws.get_execution_state().ctrlexecstate == "running"
+            self._polls += 1
+            self._still = self._still and not self._running
+            if not self._running or self._polls % _POSE_EVERY == 0:
+                self._take(read_rws(self._rws, time.monotonic()))
             if self._polls % _PANEL_EVERY == 0:
                 panel = fault_in(self._rws)
                 if panel is not None:
                     self._trip(panel)
-        self._polls += 1
+
+    def _take(self, reading: Reading) -> None:
         before = self.newest
         moved = before is None or _apart(before, reading) > _AT_REST_RAD
-        self.newest, self._still = reading, not (running or moved)
+        self.newest, self._still = reading, not (self._running or moved)
+
+    def _pause_s(self) -> float:
+        """Time to the next poll: the controller bears fewer than twenty requests a second."""
+        if self._still:
+            return 2.0 * self._settings.poll_s
+        return self._settings.poll_s if self._running else 0.5 * self._settings.poll_s
 
     def _judge(self) -> None:
         with self._lock:

@@ -56,7 +56,7 @@ class MoveOrder:
 
 
 class MotionChild:
-    """A running child. Nothing here blocks but `kill`, which waits for a process that was killed.
+    """A running child. Nothing here blocks but `reap`, which waits for a process that was killed.
 
     The thread that makes one of these must outlive it: the kernel kills the child with that thread.
     """
@@ -108,8 +108,11 @@ class MotionChild:
         self._send({"order": "beat"})
 
     def kill(self) -> None:
-        """End the process at once. Idempotent."""
+        """End the process; returns before it is gone. Idempotent."""
         self._process.kill()
+
+    def reap(self) -> None:
+        """Wait until the process that was killed is gone, and free what it held."""
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):
             assert pipe is not None

@@ -68,13 +68,17 @@ class StopPaths:
         """Whether the kept connection is open; drains the answers, which nobody needs."""
         if self._dashboard is None:
             return False
+        # a socket with a time-out would wait for it in recv, whatever the flags
+        self._dashboard.setblocking(False)
         try:
-            while self._dashboard.recv(4096, socket.MSG_DONTWAIT):
+            while self._dashboard.recv(4096):
                 pass
         except BlockingIOError:
             return True
         except OSError:
             return False
+        finally:
+            self._dashboard.settimeout(_CONNECT_S)
         return False
 
     def _reopen(self) -> None:

@@ -69,6 +69,7 @@ class Supervisor:
         self._lock = threading.RLock()
         self._closing = threading.Event()
         self._child: MotionChild | None = None
+        self._killed: list[MotionChild] = []
         self._child_wanted = False
         self._order: MoveOrder | None = None
         self._order_sent = False
@@ -106,9 +107,7 @@ class Supervisor:
         """Stop the arm; return the names of the paths that took the order."""
         ways = self._stops.order()
         with self._lock:
-            if self._cancel() and ways:
-                # whatever the child still had sent out may have come in after the first stop
-                ways = self._stops.order() or ways
+            self._cancel()
         return ways
 
     def clear(self) -> None:
@@ -122,27 +121,36 @@ class Supervisor:
         if self._thread is not threading.current_thread():
             self._thread.join(timeout=2.0)
         self.stop()
+        self._bury()
         self._remote.close()
         self._stops.close()
 
-    def _cancel(self) -> bool:
-        """Forget the order and kill the child; returns whether there was one."""
-        child, self._child = self._child, None
+    def _cancel(self) -> None:
+        """Forget the order and kill the child."""
         self._child_wanted = False
         self._order = None
         self._stop_s = self._resent_s = time.monotonic()
-        if child is not None:
-            child.kill()
-        return child is not None
+        if self._child is not None:
+            self._child.kill()
+            self._killed.append(self._child)
+            self._child = None
+
+    def _bury(self) -> None:
+        """Wait for killed children, then stop again: what they had sent may have come in late."""
+        while self._killed:
+            self._killed.pop().reap()
+            self._stops.order()
 
     def _run(self) -> None:
         while not self._closing.wait(_CYCLE_S):
             try:
+                self._bury()
                 packet = self._reader.newest()
                 with self._lock:
                     self._watch(packet)
             except DeviceUnreachable as error:
                 self._trip(str(error))
+                self._bury()
             except Exception as error:
                 # nobody would watch the arm any more: whatever it is, stop first
                 self._trip(f"the driver's supervision failed: {error!r}")
