@@ -119,7 +119,8 @@ def test_without_poses_there_is_zhang_and_the_reason_for_the_rest() -> None:
     true = mixed_scene(noise_px=0.1)
     views = replace(true.views, base_from_flange=np.full((len(true.views), 4, 4), np.nan))
     found = calibrate(views)
-    assert set(found.solutions) == {"zhang_mle", "zhang_algebraic"}
+    assert set(found.solutions) == {"zhang_mle", "zhang_algebraic", "zhang_mle_no_skew"}
+    assert found.solutions["zhang_mle_no_skew"].values["skew_px"] == 0.0
     assert found.robot is None
     for name in ("joint_ml", "zones", "focus_law", "fixed_alpha_mle"):
         assert "no frame has a logged flange pose" in found.missing[name]
@@ -208,3 +209,25 @@ def test_the_file_fits_its_published_schema(mount: str) -> None:
     assert np.allclose(content[fixed]["p_m"], BASE_FROM_FIXED[:3, 3], atol=1e-3)
     assert content["solutions"]["joint_ml"]["camera_position_error_m"]["robot_in_it"]
     assert not content["solutions"]["zhang_mle"]["camera_position_error_m"]["robot_in_it"]
+
+
+@pytest.mark.parametrize("lens", ["inverse_square", "thin_lens"])
+def test_the_joint_fit_tells_its_own_focus_with_its_covariance(lens: str) -> None:
+    true = mixed_scene(noise_px=0.05, robot_mm=0.02, robot_deg=0.002, **LENSES[lens])
+    found = calibrate(true.views)
+    joint = found.solutions["joint_ml"]
+    assert joint.focus is not None
+    assert joint.covariance is not None
+    told = {name: p.value for name, p in joint.focus.parameters.items()}
+    far, bend = ("alpha0_px", "k_px_m2") if lens == "inverse_square" else ("alpha_inf_px", "f_m")
+    assert told[far] == pytest.approx(ALPHA0, abs=2.0)
+    (truth,) = LENSES[lens].values()
+    sigma = joint.focus.parameters[bend].sigma
+    assert abs(told[bend] - truth) < 4 * sigma
+    at = joint.covariance.names.index(bend)
+    assert joint.covariance.matrix[at, at] == pytest.approx(sigma**2)
+    names = as_mapping(found, "bench")["solutions"]["joint_ml"]["covariance"]["names"]
+    assert {far, bend, "flange_from_camera.x", "base_from_board.rz"} < set(names)
+    near, farthest = found.distance_range_m
+    assert near == pytest.approx(true.depth_m.min(), rel=0.02)
+    assert farthest == pytest.approx(true.depth_m.max(), rel=0.02)
