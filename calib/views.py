@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +118,14 @@ class Views:
     def take(self, index: NDArray[np.int64] | BoolArray) -> Views:
         """The views at `index` (integers or a mask), in that order."""
         return replace(self, **{name: getattr(self, name)[index] for name in _PER_FRAME})
+
+    def joined(self, other: Views) -> Views:
+        """These views and those of `other` (of the same cell), in the order of their frames."""
+        columns: dict[str, Any] = {
+            name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _PER_FRAME
+        }
+        both = replace(self, **columns)
+        return both.take(np.argsort(both.frame, kind="stable"))
 
     @classmethod
     def blank(

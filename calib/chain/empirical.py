@@ -6,7 +6,7 @@ locating tests are made of (varying-coefficient score tests).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,7 +95,7 @@ SITES: tuple[Site, ...] = (
 
 def site_named(name: str) -> Site:
     """Return the site of that name; raises KeyError."""
-    return next(site for site in SITES if site.name == name)
+    return {site.name: site for site in SITES}[name]
 
 
 @dataclass(frozen=True)
@@ -169,29 +169,29 @@ COVARIATES: tuple[Covariate, ...] = (
 
 def covariate_named(name: str) -> Covariate:
     """Return the covariate of that name; raises KeyError."""
-    return next(c for c in COVARIATES if c.name == name)
+    return {covariate.name: covariate for covariate in COVARIATES}[name]
 
 
 def basis(covariate: Covariate, value: FloatArray, low: float, high: float) -> FloatArray:
     """(N, B) smooth functions of the covariate, without the constant; zero where it is NaN."""
-    known = np.isfinite(value).all(axis=1) if value.ndim == 2 else np.isfinite(value)
+    known = np.asarray(np.isfinite(value).all(axis=1) if value.ndim == 2 else np.isfinite(value))
     safe = np.where(np.isfinite(value), value, 0.0)
     if value.ndim == 2:
-        return safe * known[:, None]
+        return np.asarray(safe * known[:, None])
     if covariate.name.startswith("approach"):
-        return (safe * known)[:, None]
+        return np.asarray(safe * known)[:, None]
     if covariate.cyclic and high - low > np.pi:
         waves = [f(k * safe) for k in range(1, HARMONICS + 1) for f in (np.sin, np.cos)]
-        return np.stack(waves, axis=1) * known[:, None]
+        return np.asarray(np.stack(waves, axis=1) * known[:, None])
     unit = np.clip(2.0 * (safe - low) / max(high - low, 1e-12) - 1.0, -1.2, 1.2)
-    return legvander(unit, LEGENDRE_TERMS)[:, 1:] * known[:, None]
+    return np.asarray(legvander(unit, LEGENDRE_TERMS)[:, 1:] * known[:, None])
 
 
 def wave(value: FloatArray, period: float) -> FloatArray:
     """(N, 2) sine and cosine of that period; zero where the value is NaN."""
     phase = 2.0 * np.pi * np.nan_to_num(value) / period
     known = np.isfinite(value)[:, None]
-    return np.stack([np.sin(phase), np.cos(phase)], axis=1) * known
+    return np.asarray(np.stack([np.sin(phase), np.cos(phase)], axis=1) * known)
 
 
 @dataclass(frozen=True)
@@ -215,11 +215,13 @@ class Curve:
 def empirical(curve: Curve, functions: int) -> Effect:
     """An effect by which the site follows the covariate along that many functions."""
     site = curve.site
+    amount_count = functions * len(site.components)
 
     def act(values: FloatArray, walk: Walk) -> None:
-        if not values.any():
+        coefficients = values[:amount_count]
+        if not coefficients.any():
             return
-        amounts = curve.functions(walk) @ values.reshape(functions, len(site.components))
+        amounts = curve.functions(walk) @ coefficients.reshape(functions, len(site.components))
         site.shift(amounts, walk)
 
     return Effect(
@@ -232,14 +234,38 @@ def empirical(curve: Curve, functions: int) -> Effect:
         ),
         equation=f"{site.name} = constant + curve({curve.covariate.name})",
         source="varying-coefficient model (Hastie, Tibshirani 1993)",
-        parameters=tuple(
-            Parameter(f"c{b}_{name}", unit, typical, -1e3, 1e3)
-            for b in range(functions)
-            for name, unit, typical in site.components
+        parameters=(
+            *(
+                Parameter(f"c{b}_{name}", unit, typical, -1e3, 1e3)
+                for b in range(functions)
+                for name, unit, typical in site.components
+            ),
+            Parameter("low", curve.covariate.unit, curve.low, -1e9, 1e9, role="setting"),
+            Parameter("high", curve.covariate.unit, curve.high, -1e9, 1e9, role="setting"),
+            Parameter("period", "s", curve.period or 0.0, 0.0, 1e9, role="setting"),
         ),
         act=act,
         remedy="Find out what changes with it; until then the twin carries the curve.",
     )
+
+
+def empirical_from(law: str, given: Mapping[str, float]) -> Present:
+    """Return the curve that a file tells: law `site/covariate`, range, period, coefficients.
+
+    Raises
+    ------
+    KeyError
+        For an unknown site, covariate or coefficient.
+    """
+    site_name, _, covariate_name = law.partition("/")
+    site, covariate = site_named(site_name), covariate_named(covariate_name)
+    period = given.get("period", 0.0)
+    curve = Curve(
+        site, covariate, given.get("low", 0.0), given.get("high", 0.0), period if period else None
+    )
+    functions = 1 + max(int(k[1:].split("_")[0]) for k in given if k[0] == "c")
+    effect = empirical(curve, functions)
+    return Present(effect, effect.values(given))
 
 
 def span(values: FloatArray) -> tuple[float, float]:

@@ -21,7 +21,7 @@ K = len(OPTICS)
 N2 = WINDOW_INDEX * WINDOW_INDEX
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _axial_shift(o, x, y, z, out):  # type: ignore[no-untyped-def]
     """Depth seen by the pinhole, and its derivatives by x, y, z, pupil and window into `out`."""
     rho2 = x * x + y * y
@@ -51,7 +51,7 @@ def _axial_shift(o, x, y, z, out):  # type: ignore[no-untyped-def]
     return z + shift
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _tilt_matrix(tx, ty, m):  # type: ignore[no-untyped-def]
     """OpenCV's tilted-sensor homography, row by row into the nine entries of `m`."""
     cx, sx, cy, sy = math.cos(tx), math.sin(tx), math.cos(ty), math.sin(ty)
@@ -69,7 +69,7 @@ def _tilt_matrix(tx, ty, m):  # type: ignore[no-untyped-def]
     m[8] = r22
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _tilted(o, xd, yd, m, j):  # type: ignore[no-untyped-def]
     """Point on the tilted sensor; its 2x2 derivative by (xd, yd) into `j[0:4]`."""
     _tilt_matrix(o[17], o[18], m)
@@ -84,7 +84,7 @@ def _tilted(o, xd, yd, m, j):  # type: ignore[no-untyped-def]
 
 
 # One straight run of assignments: split, numba would pass every intermediate through arrays.
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  # type: ignore[no-untyped-def]  # noqa: PLR0915
     """One corner: pixel into `uv`; where `derive`, Jacobians into (2, 6) and (2, K) arrays."""
     x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
@@ -176,7 +176,7 @@ def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  #
     _sweep(o, uv, j_pose, j_optics)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _tilt_derivative(o, xd, yd, m, jt, j_optics):  # type: ignore[no-untyped-def]
     step = 1e-6
     for axis in (17, 18):
@@ -192,7 +192,7 @@ def _tilt_derivative(o, xd, yd, m, jt, j_optics):  # type: ignore[no-untyped-def
         j_optics[1, axis] = o[1] * dy
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _sweep(o, uv, j_pose, j_optics):  # type: ignore[no-untyped-def]
     """Move the corner by what the board swept until its row was read (first order)."""
     when = uv[1] / o[27] - 0.5
@@ -207,7 +207,7 @@ def _sweep(o, uv, j_pose, j_optics):  # type: ignore[no-untyped-def]
     uv[1] += dv * when
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _project_all(optics, poses, points, uv, j_pose, j_optics, derive):  # type: ignore[no-untyped-def]
     shift = np.zeros(5)
     m = np.zeros(9)

@@ -80,10 +80,16 @@ class Walk:
 
     @property
     def distance_m(self) -> FloatArray:
-        """(N,) depth of the board's centre along the optical axis; what the lens focuses on."""
+        """(N,) depth of the board's centre along the optical axis."""
         centre = self.points_m.mean(axis=0)
         pose = self.camera_from_board
         return np.asarray(pose[:, 2, :3] @ centre + pose[:, 2, 3])
+
+    @property
+    def focused_m(self) -> FloatArray:
+        """(N,) distance the lens is focused at: the logged one, or the board's where none is."""
+        logged = self.views.focus_distance_m
+        return np.where(np.isfinite(logged), logged, self.distance_m)
 
     def move_arm(self) -> None:
         """Bring the flange to where the moved joints and links put it.

@@ -13,9 +13,9 @@ from calib.chain import rigid
 from calib.discovery.bookkeeping.consistency import mounted_from_fixed
 from calib.discovery.bookkeeping.conventions import find_conventions
 from calib.discovery.bookkeeping.pairing import find_odd_frames, find_offset
-from calib.discovery.bookkeeping.recover import recover
+from calib.discovery.bookkeeping.recover import recover_joints, recover_poses
 from calib.discovery.bookkeeping.robot_model import find_robot_model
-from calib.discovery.bookkeeping.slip import Slip
+from calib.discovery.bookkeeping.slip import ROBOT_COLUMNS, Slip
 from calib.discovery.start import FreeViews, free_views
 from calib.errors import CalibrationError
 from calib.views import BoolArray, FloatArray, Views
@@ -74,8 +74,8 @@ def keep_books(views: Views, log: Views) -> Books:
     loop = mounted_from_fixed(free.camera_from_board, views.mount)
     rejected = list(baseline.rejected)
     good = np.asarray(np.isfinite(free.camera_from_board).all(axis=(1, 2)))
-    recovered = recover(views, log)
-    views, log, said = recovered.views, recover(log, log).views, list(recovered.said)
+    recovered = recover_poses(views)
+    views, log, said = recovered.views, recover_poses(log).views, list(recovered.said)
     if int((views.has_pose & good).sum()) < FEWEST_FRAMES:
         said.append("no robot poses: what a free camera pose can absorb cannot be seen")
         views = _without_robot(views, free)
@@ -83,6 +83,9 @@ def keep_books(views: Views, log: Views) -> Books:
     slips: list[Slip] = []
     views, log, loop_slips = _mend_conventions(views, log, loop)
     slips += loop_slips
+    worked_out = recover_joints(log)
+    log, said = worked_out.views, [*said, *worked_out.said]
+    views = _rows_of(views, log)
     for find in (_offset, _robot_model):
         slip = find(views, log, loop)
         if slip is not None:
@@ -105,6 +108,13 @@ def keep_books(views: Views, log: Views) -> Books:
             f" a diagnosis needs {FEWEST_FRAMES}"
         )
     return _books(views, log, free, slips, rejected, said, True, kept)
+
+
+def _rows_of(views: Views, log: Views) -> Views:
+    """The views with the robot's columns of their own rows of the log."""
+    where = {int(frame): k for k, frame in enumerate(log.frame)}
+    row = np.array([where[int(frame)] for frame in views.frame])
+    return replace(views, **{name: getattr(log, name)[row] for name in ROBOT_COLUMNS})
 
 
 def _offset(views: Views, log: Views, loop: FloatArray) -> Slip | None:

@@ -25,12 +25,11 @@ from calib.discovery.diagnosis import (
 from calib.discovery.leftover import Leftover, look_for_leftover
 from calib.discovery.locate import Cell, locate
 from calib.discovery.prove import held_out, prediction_rms_px, prove
-from calib.discovery.score import pose_numbers
 from calib.discovery.search import Search
 from calib.discovery.start import Fitter, fit_start
 from calib.solver.joint import JointFit
-from calib.solver.noise import Noise
-from calib.views import Views
+from calib.solver.noise import Noise, profile
+from calib.views import BoolArray, Views
 
 _MISMATCHES_TOLD = 8
 _WORTH_TELLING = 1e-3
@@ -80,7 +79,7 @@ class _Fits:
     plain: JointFit
 
 
-def _told(books: Books, held: np.ndarray, before: JointFit, leftover: Leftover) -> Diagnosis:  # type: ignore[type-arg]
+def _told(books: Books, held: BoolArray, before: JointFit, leftover: Leftover) -> Diagnosis:
     search = leftover.search
     after = search.best.fit
     everything = Fitter(books.views, books.has_robot)
@@ -97,18 +96,16 @@ def _told(books: Books, held: np.ndarray, before: JointFit, leftover: Leftover) 
         unexplained=_unexplained(leftover),
         mismatch=_mismatches(fits, everything),
         proof=proof,
-        before=plain.model,
-        twin=twin.model,
-        noise=twin.noise,
+        plain=plain,
+        twin=twin,
         views=books.views,
         log=books.log,
         rejected=books.rejected,
         said=(*books.said, *_unseen(books.views)),
-        fit=twin,
     )
 
 
-def _restarted(fit: JointFit, frames: int, held: np.ndarray) -> JointFit:  # type: ignore[type-arg]
+def _restarted(fit: JointFit, frames: int, held: BoolArray) -> JointFit:
     """The fit with room for the frames that were held out."""
     error = np.zeros((frames, 6))
     error[~held] = fit.flange_error
@@ -191,7 +188,7 @@ def _mismatches(fits: _Fits, fitter: Fitter) -> tuple[Mismatch, ...]:
     """Where the plain cell misses, judged by the noise that the final cell leaves."""
     judged = replace(fits.plain, noise=_judge(fits.plain.noise, fits.twin.noise))
     cells = [c for c in locate(judged, fitter.views) if c.p_value < _WORTH_TELLING]
-    excess = _excess(judged, fitter.views)
+    excess = _excess(judged)
     told: list[Cell] = []
     for cell in sorted(cells, key=lambda c: -c.score.gain):
         if all((cell.site, cell.covariate) != (t.site, t.covariate) for t in told):
@@ -218,13 +215,10 @@ def _judge(before: Noise, after: Noise) -> Noise:
     )
 
 
-def _excess(fit: JointFit, views: Views) -> float:
+def _excess(fit: JointFit) -> float:
     """Squared misfit, in units of the noise, above what noise alone makes."""
-    pull = fit.flange_error @ fit.noise.flange_information
-    square = float(np.sum(pull * fit.flange_error))
-    residual = np.nansum(fit.residual_px**2, axis=2) * fit.weight / fit.noise.corner_px**2
-    freedom = 2 * int((fit.weight > 0).sum()) - pose_numbers(views)
-    return max(square + float(residual.sum()) - freedom, 1.0)
+    square = profile(fit.equations, fit.noise).square_sum
+    return max(square - (fit.equations.observations - fit.parameters), 1.0)
 
 
 def _unseen(views: Views) -> tuple[str, ...]:

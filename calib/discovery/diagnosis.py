@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from calib.calibration.result import Rejection
-from calib.chain.model import CellModel
 from calib.discovery.prove import Proof
 from calib.solver.joint import JointFit
-from calib.solver.noise import Noise
 from calib.views import Views
 
 Verdict = Literal["consistent", "explained", "unexplained"]
@@ -78,16 +76,12 @@ class Diagnosis:
     ----------
     verdict, effects, ambiguous_with, unexplained, mismatch, proof:
         As in the contract's diagnosis.json.
-    before, twin:
-        The plain cell and the cell with all that was found, fitted to every usable frame.
-    noise:
-        Noise levels of the twin.
+    plain, twin:
+        The plain cell and the cell with all that was found, each fitted to every usable frame.
     views, log:
         The mended frames that were used, and every mended row of the log.
     rejected, said:
         Frames left out; what was worked out, filled in, or could not be seen.
-    fit:
-        The twin's joint fit, for the report.
     """
 
     verdict: Verdict
@@ -96,11 +90,9 @@ class Diagnosis:
     unexplained: Unexplained | None
     mismatch: tuple[Mismatch, ...]
     proof: Proof | None
-    before: CellModel
-    twin: CellModel
-    noise: Noise
+    plain: JointFit
+    twin: JointFit
     views: Views
     log: Views
     rejected: tuple[Rejection, ...]
     said: tuple[str, ...]
-    fit: JointFit

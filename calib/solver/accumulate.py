@@ -12,8 +12,8 @@ from calib.views import FloatArray
 
 
 # One flat loop: this is where all the time goes, and numba inlines nothing across arrays.
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _accumulate(optics, poses, points, uv, weight, active, basis, gram, residual, cross, own):  # noqa: C901
+@njit(cache=True, nogil=True)
+def _accumulate(optics, poses, points, uv, weight, active, basis, gram, residual, cross, own):  # type: ignore[no-untyped-def]  # noqa: C901
     shift = np.zeros(5)
     m = np.zeros(9)
     jt = np.zeros(4)

@@ -97,7 +97,7 @@ def fit_free_poses(
     """
     active = tuple(COLUMN[name] for name in free)
     seen = np.isfinite(corners_px).all(axis=2)
-    counted = seen.astype(np.float64) if weight is None else seen * weight
+    counted: FloatArray = np.asarray(seen * (1.0 if weight is None else weight), dtype=np.float64)
     optics, poses = optics.copy(), camera_from_board.copy()
     damping, converged, iteration = 1e-6, False, 0
     equations, residual = _equations(optics, poses, points_m, corners_px, counted, active)

@@ -141,7 +141,9 @@ def dependence(
         ahead = rigid.to_vector(plus.camera_from_board @ back)
         behind = rigid.to_vector(minus.camera_from_board @ back)
         d_pose[:, :, k] = (ahead - behind) / width
-    active = tuple(int(c) for c in np.flatnonzero(np.abs(d_optics).max(axis=(0, 2), initial=0.0) > 0.0))
+    active = tuple(
+        int(c) for c in np.flatnonzero(np.abs(d_optics).max(axis=(0, 2), initial=0.0) > 0.0)
+    )
     moving = np.flatnonzero(np.abs(d_points).max(axis=(1, 2), initial=0.0) > 0.0)
     local = np.zeros((n, len(active) + 6 + len(moving), p))
     local[:, : len(active)] = d_optics[:, active]

@@ -12,12 +12,14 @@ from pydantic import BaseModel
 
 from cell.files.calibration_file import CalibrationFile
 from cell.files.cell_file import CellFile
+from cell.files.diagnosis_file import DiagnosisFile
 from cell.files.plan_file import PlanFile
 
 FOLDER = Path(__file__).parents[1] / "schemas"
 MODELS: dict[str, type[BaseModel]] = {
     "calibration.schema.json": CalibrationFile,
     "cell.schema.json": CellFile,
+    "diagnosis.schema.json": DiagnosisFile,
     "plan.schema.json": PlanFile,
 }
 

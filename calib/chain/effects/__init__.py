@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 
 from calib.chain.effect import Effect, Present
+from calib.chain.empirical import empirical_from
 
 
 @cache
@@ -52,15 +53,20 @@ def make_effect(name: str, given: Mapping[str, float | str | Sequence[float]]) -
         For an unknown effect, law or parameter.
     """
     law = given.get("law")
+    numbers = _flat(name, {key: value for key, value in given.items() if key != "law"})
+    if name == "empirical":
+        return empirical_from(str(law), numbers)
     effect = find_effect(name, None if law is None else str(law))
+    return Present(effect, effect.values(numbers))
+
+
+def _flat(name: str, given: Mapping[str, float | str | Sequence[float]]) -> dict[str, float]:
     flat: dict[str, float] = {}
     for key, value in given.items():
-        if key == "law":
-            continue
         if isinstance(value, (int, float)):
             flat[key] = float(value)
         elif isinstance(value, str):
-            raise KeyError(f"{effect.label}: {key} is a number, got {value!r}")
+            raise KeyError(f"{name}: {key} is a number, got {value!r}")
         else:
             flat.update({f"{key}_{i}": float(v) for i, v in enumerate(value, start=1)})
-    return Present(effect, effect.values(flat))
+    return flat

@@ -8,7 +8,7 @@ from calib.views import FloatArray
 
 
 def _act(values: FloatArray, walk: Walk) -> None:
-    walk.column("k1")[:] += values[0] / walk.distance_m
+    walk.column("k1")[:] += values[0] / walk.focused_m
 
 
 EFFECT = Effect(

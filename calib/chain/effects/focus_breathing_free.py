@@ -18,7 +18,7 @@ def _act(values: FloatArray, walk: Walk) -> None:
     near_m, far_m = values[_NODES - 1], values[_NODES]
     at = np.linspace(0.0, 1.0, _NODES)
     curve = CubicSpline(at, np.concatenate([values[: _NODES - 1], [0.0]]), bc_type="natural")
-    inverse = np.clip(1.0 / walk.distance_m, 0.5 / far_m, 2.0 / near_m)
+    inverse = np.clip(1.0 / walk.focused_m, 0.5 / far_m, 2.0 / near_m)
     where = (1.0 / near_m - inverse) / (1.0 / near_m - 1.0 / far_m)
     growth = 1.0 + curve(where)
     walk.column("alpha_px")[:] *= growth

@@ -10,7 +10,7 @@ from calib.views import FloatArray
 
 
 def _act(values: FloatArray, walk: Walk) -> None:
-    near = 1.0 / np.square(walk.distance_m)
+    near = 1.0 / np.square(walk.focused_m)
     ratio = walk.column("beta_px") / walk.column("alpha_px")
     walk.column("alpha_px")[:] -= values[0] * near
     walk.column("beta_px")[:] -= values[0] * near * ratio
@@ -21,7 +21,7 @@ EFFECT = Effect(
     law="inverse_square",
     link="lens",
     physics="The lens moves to focus, so its focal length depends on the distance of the board.",
-    equation="alpha = alpha0 - k / d^2, d the depth of the board's centre",
+    equation="alpha = alpha0 - k / d^2, d the distance the lens is focused at",
     source="Ricolfe-Viala, The influence of the focus in the camera calibration process, Eq. 25",
     parameters=(Parameter("k_px_m2", "px m^2", 10.0, -2000.0, 2000.0),),
     act=_act,

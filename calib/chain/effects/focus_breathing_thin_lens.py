@@ -10,7 +10,7 @@ from calib.views import FloatArray
 
 
 def _act(values: FloatArray, walk: Walk) -> None:
-    distance_m = np.maximum(walk.distance_m, 1e-3)
+    distance_m = np.maximum(walk.focused_m, 1e-3)
     growth = distance_m / (distance_m - np.minimum(values[0], 0.9 * distance_m))
     walk.column("alpha_px")[:] *= growth
     walk.column("beta_px")[:] *= growth
@@ -21,7 +21,7 @@ EFFECT = Effect(
     law="thin_lens",
     link="lens",
     physics="The lens moves out to focus near things, so its focal length grows as they near.",
-    equation="alpha = alpha_inf * d / (d - f), d the depth of the board's centre",
+    equation="alpha = alpha_inf * d / (d - f), d the distance the lens is focused at",
     source="Gaussian lens equation, 1/f = 1/d + 1/b (Born & Wolf, section 4.4)",
     parameters=(Parameter("f_m", "m", 0.015, -0.2, 0.2),),
     act=_act,

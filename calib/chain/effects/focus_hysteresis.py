@@ -4,17 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
+from calib.chain import rigid
 from calib.chain.effect import Effect, Parameter
 from calib.chain.walk import Walk
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
+def _came_from_m(walk: Walk) -> FloatArray:
+    """(N,) distance of the board where the arm came from; the frame before where not logged."""
     order = np.argsort(walk.views.frame, kind="stable")
-    came_from = np.empty(len(order))
-    distance_m = walk.distance_m[order]
-    came_from[order] = np.sign(np.diff(distance_m, prepend=distance_m[:1]))
-    growth = 1.0 + values[0] * came_from
+    before = np.empty(len(order))
+    before[order] = np.concatenate([walk.focused_m[order][:1], walk.focused_m[order][:-1]])
+    if walk.arm is None or not walk.in_hand:
+        return before
+    flange = walk.arm.forward(walk.views.approach_joints_rad)
+    camera_from_board = rigid.inverse(flange @ walk.flange_from_mounted) @ walk.base_from_fixed
+    centre = walk.points_m.mean(axis=0)
+    approach = camera_from_board[:, 2, :3] @ centre + camera_from_board[:, 2, 3]
+    return np.where(np.isfinite(approach), approach, before)
+
+
+def _act(values: FloatArray, walk: Walk) -> None:
+    growth = 1.0 + values[0] * np.sign(walk.focused_m - _came_from_m(walk))
     walk.column("alpha_px")[:] *= growth
     walk.column("beta_px")[:] *= growth
 
@@ -23,7 +34,7 @@ EFFECT = Effect(
     name="focus_hysteresis",
     link="lens",
     physics="The focus drive has play: it stops elsewhere when it comes from near than from far.",
-    equation="alpha = alpha0 * (1 + relative * sign(distance - distance of the frame before))",
+    equation="alpha = alpha0 * (1 + relative * sign(distance - distance it came from))",
     source="play of a focus drive; size from autofocus repeatability of machine-vision lenses",
     parameters=(Parameter("relative", "1", 3e-4, -0.02, 0.02),),
     act=_act,

@@ -18,42 +18,35 @@ class Recovered:
     said: tuple[str, ...]
 
 
-def recover(views: Views, log: Views) -> Recovered:
-    """Fill in poses from joints, joints from poses, and approaches from the order of the log.
-
-    Parameters
-    ----------
-    views:
-        The frames.
-    log:
-        Every row of the log that is known, the frames' own among them.
-    """
-    said: list[str] = []
-    kinematics = None if views.robot_model is None else arm(views.robot_model)
-    if kinematics is not None:
-        views, said = _poses_from_joints(views, kinematics, said)
-        views, said = _joints_from_poses(views, kinematics, said)
-    views, said = _approaches(views, log, said)
-    return Recovered(views, tuple(said))
+def recover_poses(views: Views) -> Recovered:
+    """Fill in flange poses that were not logged from the joints that were."""
+    if views.robot_model is None:
+        return Recovered(views, ())
+    return Recovered(*_poses_from_joints(views, arm(views.robot_model)))
 
 
-def _poses_from_joints(
-    views: Views, kinematics: ArmKinematics, said: list[str]
-) -> tuple[Views, list[str]]:
+def recover_joints(views: Views) -> Recovered:
+    """Fill in joints from poses (mended ones), and approaches from the order of the log."""
+    said: tuple[str, ...] = ()
+    if views.robot_model is not None:
+        views, said = _joints_from_poses(views, arm(views.robot_model))
+    views, more = _approaches(views)
+    return Recovered(views, (*said, *more))
+
+
+def _poses_from_joints(views: Views, kinematics: ArmKinematics) -> tuple[Views, tuple[str, ...]]:
     lacking = ~views.has_pose & np.isfinite(views.joints_rad).all(axis=1)
     if not lacking.any():
-        return views, said
+        return views, ()
     poses = views.base_from_flange.copy()
     poses[lacking] = kinematics.forward(views.joints_rad[lacking])
-    said = [*said, f"flange poses of {int(lacking.sum())} frames worked out from the joints"]
-    return replace(views, base_from_flange=poses), said
+    words = f"flange poses of {int(lacking.sum())} frames worked out from the joints"
+    return replace(views, base_from_flange=poses), (words,)
 
 
-def _joints_from_poses(
-    views: Views, kinematics: ArmKinematics, said: list[str]
-) -> tuple[Views, list[str]]:
+def _joints_from_poses(views: Views, kinematics: ArmKinematics) -> tuple[Views, tuple[str, ...]]:
     if np.isfinite(views.joints_rad).any() or not views.has_pose.any():
-        return views, said
+        return views, ()
     joints = np.full((len(views), 6), np.nan)
     near: FloatArray | None = None
     for i in np.flatnonzero(views.has_pose):
@@ -67,9 +60,9 @@ def _joints_from_poses(
         joints[i] = branches[int(np.argmin(_turns(branches - target)))]
         near = joints[i]
     if not np.isfinite(joints).any():
-        return views, said
+        return views, ()
     words = "joints worked out from the flange poses, by the branch nearest to the frame before"
-    return replace(views, joints_rad=joints), [*said, words]
+    return replace(views, joints_rad=joints), (words,)
 
 
 def _turns(difference: FloatArray) -> FloatArray:
@@ -77,19 +70,16 @@ def _turns(difference: FloatArray) -> FloatArray:
     return np.asarray(np.abs(wrapped).max(axis=1))
 
 
-def _approaches(views: Views, log: Views, said: list[str]) -> tuple[Views, list[str]]:
+def _approaches(views: Views) -> tuple[Views, tuple[str, ...]]:
     if np.isfinite(views.approach_joints_rad).any() or not np.isfinite(views.joints_rad).any():
-        return views, said
-    where = {int(frame): k for k, frame in enumerate(log.frame)}
+        return views, ()
+    where = {int(frame): k for k, frame in enumerate(views.frame)}
     approach = np.full_like(views.joints_rad, np.nan)
-    joints = log.joints_rad if np.isfinite(log.joints_rad).any() else views.joints_rad
-    source = log.frame if joints is log.joints_rad else views.frame
-    where = {int(frame): k for k, frame in enumerate(source)}
     for i, frame in enumerate(views.frame):
         before = where.get(int(frame) - 1)
         if before is not None:
-            approach[i] = joints[before]
+            approach[i] = views.joints_rad[before]
     if not np.isfinite(approach).any():
-        return views, said
+        return views, ()
     words = "where a move came from taken from the frame before"
-    return replace(views, approach_joints_rad=approach), [*said, words]
+    return replace(views, approach_joints_rad=approach), (words,)

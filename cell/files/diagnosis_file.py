@@ -1,0 +1,122 @@
+"""`diagnosis.json` as a model: all that is written is checked against it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+SCHEMA: Final = "cell.diagnosis/1"
+Probability = Annotated[float, Field(ge=0, le=1)]
+NotNegative = Annotated[float, Field(ge=0)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False
+    )
+
+
+class RejectedPart(_Part):
+    """A frame left out."""
+
+    frame: int
+    reason: str
+
+
+class ValuePart(_Part):
+    """A number with its one-sigma uncertainty; zero sigma: given or exact."""
+
+    value: float
+    sigma: NotNegative
+    unit: str
+
+
+class HoldoutPart(_Part):
+    """Whole frames that no fit has seen, predicted from the robot's log alone."""
+
+    frames: list[int]
+    rms_px_before: NotNegative
+    """By the plain model."""
+    rms_px_after: NotNegative
+    """By the final one."""
+    noise_px: NotNegative
+    """What corner noise and the robot's scatter alone would make."""
+    nll_before: float
+    nll_after: float
+    """Negative log likelihood per frame."""
+
+
+class MismatchPart(_Part):
+    """Where the misfit of the plain model lives."""
+
+    link: str
+    site: str
+    """The constant of the chain that is none."""
+    covariate: str
+    where: str
+    share_of_excess: Probability
+    """Share of the squared misfit above the noise that a curve along the covariate takes away."""
+    p_value: Probability
+
+
+class EffectPart(_Part):
+    """Named physics, or a slip of the log."""
+
+    name: str
+    link: str
+    law: str | None
+    physics: str
+    remedy: str
+    parameters: dict[str, ValuePart]
+    p_value: Probability
+    holdout_gain_px: float | None
+    """How much worse the held-out frames are predicted without it; null for a slip."""
+
+
+class AmbiguityPart(_Part):
+    """Names that these data cannot tell apart."""
+
+    names: list[str]
+    why: str
+    experiment: str
+    """What would tell them apart, in words."""
+    separate_with: str | None
+    """A plan file that would, beside this file; null where no poses can."""
+
+
+class UnexplainedPart(_Part):
+    """Something real without a name: where it lives."""
+
+    link: str
+    site: str
+    covariate: str
+    where: str
+    p_value: Probability
+
+
+class NoisePart(_Part):
+    """One-sigma levels, estimated from the recording."""
+
+    corner_px: NotNegative
+    flange_m: NotNegative | None
+    flange_rad: NotNegative | None
+    print_m: NotNegative
+
+
+class DiagnosisFile(_Part):
+    """The whole of diagnosis.json."""
+
+    schema_: Literal["cell.diagnosis/1"] = Field(default=SCHEMA, alias="schema")
+    recording: str
+    verdict: Literal["consistent", "explained", "unexplained"]
+    holdout: HoldoutPart | None
+    mismatch: list[MismatchPart]
+    effects: list[EffectPart]
+    ambiguous_with: list[AmbiguityPart]
+    unexplained: UnexplainedPart | None
+    noise: NoisePart
+    frames_used: list[int]
+    frames_rejected: list[RejectedPart]
+    notes: list[str]
+    """What was worked out rather than logged, and which effects could not have been seen."""
