@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cell.report.data import Evidence, ReportData, SolutionPoses, Truth
 from cell.report.from_calibration import solution_poses, solution_residuals
-from cell.report.from_diagnosis import evidence
+from cell.report.from_diagnosis import diagnosis_evidence
 from cell.report.from_recording import recording_data
 from cell.report.page import write_report
 
@@ -13,7 +13,7 @@ __all__ = [
     "ReportData",
     "SolutionPoses",
     "Truth",
-    "evidence",
+    "diagnosis_evidence",
     "recording_data",
     "solution_poses",
     "solution_residuals",

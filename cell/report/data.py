@@ -18,6 +18,7 @@ PREFERENCE = (
     "joint_ml",
     "fixed_alpha_mle",
     "fixed_alpha_algebraic",
+    "zhang_mle_no_skew",
     "zhang_mle",
     "zhang_algebraic",
 )

@@ -15,7 +15,7 @@ from cell.report.pose_errors import (
 )
 
 
-def evidence(
+def diagnosis_evidence(
     views: Views,
     mended: Views,
     before: CellModel,

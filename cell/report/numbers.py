@@ -15,6 +15,7 @@ _SMALLER = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "s": ("ms", 1e3)}
 NAMES = {
     "zhang_algebraic": "Zhang, algebraic",
     "zhang_mle": "Zhang, maximum likelihood",
+    "zhang_mle_no_skew": "Zhang, maximum likelihood, no skew",
     "fixed_alpha_algebraic": "fixed α, algebraic",
     "fixed_alpha_mle": "fixed α, maximum likelihood",
     "joint_ml": "joint fit with the robot",

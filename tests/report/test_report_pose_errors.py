@@ -12,7 +12,7 @@ from calib.chain.effects import make_effect
 from calib.chain.model import CellModel, predict
 from calib.chain.optics import optics_row
 from calib.views import Board, Views
-from cell.report.from_diagnosis import evidence
+from cell.report.from_diagnosis import diagnosis_evidence
 from cell.report.pose_errors import pose_errors, scale_at_robot_depth, without_constant_part
 
 ALPHA_PX = 1500.0
@@ -76,7 +76,7 @@ def test_frames_the_diagnosis_left_out_are_missing_after_and_there_before() -> N
     warp = make_effect("board_warp", {"bend_x_m": 4e-4})
     twin = plain().with_effects([breathing, warp])
     views = recorded(twin)
-    found = evidence(views, views.take(np.arange(2, 12)), plain(), twin, corner_px=0.1,
+    found = diagnosis_evidence(views, views.take(np.arange(2, 12)), plain(), twin, corner_px=0.1,
                      flange_m=5e-5)  # fmt: skip
     assert found.shift_before_m is not None
     assert found.shift_after_m is not None

@@ -33,7 +33,7 @@ def story(data: ReportData) -> str:
         "diagnosis",
         f"Diagnosis: {verdict.lower()}",
         html.paragraph(f"{meaning[0].upper()}{meaning[1:]}.", "lead"),
-        html.bullets(data.diagnosis.get("said") or []),
+        html.bullets(data.diagnosis.get("notes") or []),
         _where(data),
         *(_effect(data, effect) for effect in data.diagnosis.get("effects") or []),
         _unexplained(data.diagnosis),
@@ -138,11 +138,17 @@ def _rivals(diagnosis: Mapping[str, Any]) -> str:
         ("could also be", "because", "what would tell them apart"),
         [
             (", ".join(n.replace("_", " ") for n in row["names"]), row.get("why") or "",
-             f"cell run {row['separate_with']}" if row.get("separate_with") else "no pose plan can")
+             _separation(row))
             for row in rows
         ],
     )  # fmt: skip
     return f"<h3>What else it could be</h3>{table}"
+
+
+def _separation(row: Mapping[str, Any]) -> str:
+    if row.get("separate_with"):
+        return f"cell run {row['separate_with']}"
+    return str(row.get("experiment") or "no pose plan can")
 
 
 def _holdout(data: ReportData) -> str:
