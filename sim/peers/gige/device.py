@@ -19,23 +19,21 @@ from types import TracebackType
 from drivers.camera import Camera, FocusSetting
 from sim.peers.gige import features as ft
 from sim.peers.gige import gvcp
+from sim.peers.gige.behaviour import Behaviour
+from sim.peers.gige.control import ControlPrivilege, Host
 from sim.peers.gige.gvcp import Command, Refused, Status
-from sim.peers.gige.gvsp import BITS, probe_packet
+from sim.peers.gige.gvsp import probe_packet
 from sim.peers.gige.lens import Lens
 from sim.peers.gige.registers import (
     CONTROL_PRIVILEGE,
     DISCOVERY_BYTES,
-    STREAM_ADDRESS,
-    STREAM_PORT,
     TIMESTAMP_CONTROL,
     RegisterMap,
 )
-from sim.peers.gige.streamer import Acquisition, Faults, Streamer
+from sim.peers.gige.streamer import Faults, Streamer
 
 _FIRE_TEST_PACKET = 0x80000000
 _LATCH = 0x2
-_EXCLUSIVE_OR_CONTROL = 0x3
-_TICK_S = 1e-9
 
 
 class GigEPeer:
@@ -95,10 +93,10 @@ class GigEPeer:
         self.registers.set("ExposureTime", values["exposure_s"] * 1e6)
         self.registers.set("Gain", values["gain_db"])
         self.streamer = Streamer(self._source, self.address, self.faults, self._link, self._seed)
-        self._lens = Lens(self._source, self.streamer.order, step or 0, steps_s)
+        lens = Lens(self._source, self.streamer.order, step or 0, steps_s)
+        self._behaviour = Behaviour(self.registers, self.streamer, lens, self._source)
         self.registers.set_word(0x0D1C, self.streamer.port)
-        self._controller: tuple[str, int] | None = None
-        self._heard_s = 0.0
+        self.control = ControlPrivilege()
         self._sockets = [_bound((self.address, gvcp.PORT))]
         if self._broadcast:
             self._sockets.append(_bound(("255.255.255.255", gvcp.PORT)))
@@ -141,11 +139,6 @@ class GigEPeer:
     ) -> None:
         self.close()
 
-    @property
-    def controlled_by(self) -> tuple[str, int] | None:
-        """Address and port of the program that holds the control privilege."""
-        return self._controller
-
     def _serve(self) -> None:
         while self._powered:
             ready, _, _ = select.select(self._sockets, [], [], 0.02)
@@ -156,9 +149,8 @@ class GigEPeer:
                     self._answer(request, host)
             self._expire_heartbeat()
 
-    def _answer(self, request: gvcp.Request, host: tuple[str, int]) -> None:
-        if host == self._controller:
-            self._heard_s = time.monotonic()
+    def _answer(self, request: gvcp.Request, host: Host) -> None:
+        self.control.hear(host)
         try:
             answer = gvcp.acknowledge(request, self._do(request, host))
         except Refused as refusal:
@@ -170,7 +162,7 @@ class GigEPeer:
             with contextlib.suppress(OSError):
                 self._sockets[0].sendto(answer, host)
 
-    def _do(self, request: gvcp.Request, host: tuple[str, int]) -> bytes:
+    def _do(self, request: gvcp.Request, host: Host) -> bytes:
         payload = request.payload
         match request.command:
             case Command.DISCOVERY:
@@ -194,18 +186,13 @@ class GigEPeer:
         raise Refused(Status.NOT_IMPLEMENTED)
 
     def _read(self, address: int, length: int) -> bytes:
-        name = self.registers.name_at(address)
-        if name in ("OpticControllerStatus", "FocusStatus"):
-            self.registers.set(name, self._lens.status)
-        elif name == "FocusStepper":
-            self.registers.set(name, self._lens.step)
+        self._behaviour.refresh(self.registers.name_at(address))
         return self.registers.read(address, length)
 
-    def _write(self, address: int, data: bytes, host: tuple[str, int]) -> None:
+    def _write(self, address: int, data: bytes, host: Host) -> None:
         if address == CONTROL_PRIVILEGE:
             return self._claim(int.from_bytes(data, "big"), host)
-        if host != self._controller:
-            raise Refused(Status.ACCESS_DENIED)
+        self.control.require(host)
         feature, value = self.registers.feature_at(address, data)
         if feature is None:
             return self._write_bootstrap(address, int(value))
@@ -213,22 +200,17 @@ class GigEPeer:
             raise Refused(Status.ACCESS_DENIED)
         if feature.kind != "command":
             self.registers.set(feature.name, value)
-        self._react(feature.name, value)
+        self._behaviour.react(feature.name, value)
         return None
 
-    def _claim(self, privilege: int, host: tuple[str, int]) -> None:
-        if self._controller not in (None, host):
-            raise Refused(Status.ACCESS_DENIED)
-        self._controller = host if privilege & _EXCLUSIVE_OR_CONTROL else None
-        self._heard_s = time.monotonic()
+    def _claim(self, privilege: int, host: Host) -> None:
+        self.control.claim(privilege, host)
         self.registers.set_word(CONTROL_PRIVILEGE, privilege)
-        if self._controller is None:
+        if self.control.holder is None:
             self.streamer.halt()
 
     def _expire_heartbeat(self) -> None:
-        timeout_s = self.registers.word(ft.HEARTBEAT_TIMEOUT) / 1000
-        if self._controller and time.monotonic() - self._heard_s > timeout_s:
-            self._controller = None
+        if self.control.expired(self.registers.word(ft.HEARTBEAT_TIMEOUT) / 1000):
             self.registers.set_word(CONTROL_PRIVILEGE, 0)
             self.streamer.halt()
 
@@ -238,69 +220,10 @@ class GigEPeer:
         elif address == ft.STREAM_PACKET_SIZE:
             self.registers.set_word(address, value & 0xFFFF)
             if value & _FIRE_TEST_PACKET:
-                self.streamer.send_raw(probe_packet(value & 0xFFFF), self._stream_host())
+                host = self._behaviour.stream_host()
+                self.streamer.send_raw(probe_packet(value & 0xFFFF), host)
         else:
             self.registers.set_word(address, value)
-
-    def _react(self, name: str, value: ft.Value) -> None:
-        match name:
-            case "AcquisitionStart":
-                self.streamer.start(self._acquisition())
-            case "AcquisitionStop":
-                self.streamer.halt()
-            case "TriggerSoftware":
-                self._trigger()
-            case "ExposureTime" | "Gain":
-                self._configure_source()
-            case "Width" | "Height" | "PixelFormat":
-                self._update_payload_size()
-            case "FocusStepper":
-                self._lens.move_to(int(value))
-            case "FocusAuto" if value:
-                self._lens.focus_once()
-                self.registers.set("FocusAuto", 0)
-            case "OpticControllerInitialize" | "FocusInitialize":
-                self._lens.initialize()
-
-    def _trigger(self) -> None:
-        triggered, by_software = (
-            self.registers.get("TriggerMode"),
-            not self.registers.get("TriggerSource"),
-        )
-        if triggered and by_software:
-            self.streamer.trigger()
-
-    def _configure_source(self) -> None:
-        exposure_s = self.registers.number("ExposureTime") * 1e-6
-        gain_db = self.registers.number("Gain")
-        self.streamer.set_exposure(exposure_s)
-        self.streamer.order(
-            lambda: _ignore(self._source.configure(exposure_s=exposure_s, gain_db=gain_db))
-        )
-
-    def _update_payload_size(self) -> None:
-        reg = self.registers
-        bits = BITS[int(reg.number("PixelFormat"))]
-        reg.set("PayloadSize", int(reg.number("Width") * reg.number("Height")) * bits // 8)
-
-    def _stream_host(self) -> tuple[str, int]:
-        ip = ipaddress.IPv4Address(self.registers.word(STREAM_ADDRESS))
-        return str(ip), self.registers.word(STREAM_PORT) & 0xFFFF
-
-    def _acquisition(self) -> Acquisition:
-        reg = self.registers
-        triggered = bool(reg.get("TriggerMode"))
-        return Acquisition(
-            host=self._stream_host(),
-            packet_bytes=reg.word(ft.STREAM_PACKET_SIZE) & 0xFFFF,
-            packet_delay_s=reg.word(ft.STREAM_PACKET_DELAY) * _TICK_S,
-            pixel_format=int(reg.number("PixelFormat")),
-            width=int(reg.number("Width")),
-            height=int(reg.number("Height")),
-            exposure_s=reg.number("ExposureTime") * 1e-6,
-            period_s=None if triggered else 1 / reg.number("AcquisitionFrameRate"),
-            single_frame=bool(reg.get("AcquisitionMode")),
-        )
 
 
 def _bound(address: tuple[str, int]) -> socket.socket:
@@ -309,7 +232,3 @@ def _bound(address: tuple[str, int]) -> socket.socket:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     made.bind(address)
     return made
-
-
-def _ignore(_: object) -> None:
-    """Drop a result."""

@@ -208,7 +208,7 @@ def test_a_camera_held_by_another_program_is_refused_in_words(
 
 
 def test_a_camera_that_a_crashed_program_held_is_waited_for(peer: GigEPeer) -> None:
-    peer._controller, peer._heard_s = ("127.0.0.1", 9), time.monotonic()
+    peer.control.claim(2, ("127.0.0.1", 9))
     camera = AravisCamera(peer.address)
     camera.connect()
     assert camera.grab(5.0).image.size
@@ -233,7 +233,7 @@ def test_features_of_the_cell_file_are_set_and_bad_ones_refused(peer: GigEPeer) 
         with pytest.raises(DeviceRefused, match=next(iter(features))):
             bad.connect()
         bad.close()
-    assert peer.controlled_by is None
+    assert peer.control.holder is None
 
 
 def test_an_unknown_pixel_format_is_refused_before_anything_is_opened() -> None:

@@ -96,7 +96,7 @@ def test_a_controller_that_falls_silent_loses_control(peer: GigEPeer, host: Host
         time.sleep(0.15)
         assert host.read(CONTROL_PRIVILEGE) == 2
     time.sleep(0.5)
-    assert peer.controlled_by is None
+    assert peer.control.holder is None
     assert host.read(CONTROL_PRIVILEGE) == 0
 
 
