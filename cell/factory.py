@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from cell.errors import InputError
 from cell.files.cell_file import (
+    AbbRobot,
     CellFile,
     GenicamCamera,
     GigeCamera,
@@ -45,9 +46,14 @@ def arm_of(cell: CellFile) -> Arm:
     """The driver of a cell's arm, not yet connected; raises `InputError` for a simulated one."""
     robot = cell.robot
     if isinstance(robot, UniversalRobot):
-        from drivers.ur import URArm
+        from drivers.ur import URArm, URSettings
 
-        return URArm(robot.address)
+        return URArm(robot.address, URSettings(upper_registers=robot.upper_registers))
+    if isinstance(robot, AbbRobot):
+        from drivers.abb import ABBArm, ABBSettings
+
+        settings = ABBSettings(robot.user, robot.password, egm_port=robot.egm_port)
+        return ABBArm(f"http://{robot.address}", settings)
     raise InputError(_only_simulated(cell, "arm"))
 
 

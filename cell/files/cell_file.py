@@ -51,6 +51,8 @@ class UniversalRobot(SimulatedRobot):
     driver: Literal["ur"]  # type: ignore[assignment]
     address: str
     """Name or IP address of the controller."""
+    upper_registers: bool = False
+    """Use RTDE registers 24 to 47, where a fieldbus or another client holds the lower ones."""
 
 
 class AbbRobot(SimulatedRobot):
@@ -62,6 +64,8 @@ class AbbRobot(SimulatedRobot):
     user: str = "Default User"
     password: str = "robotics"
     """The controller's factory default; give your own where it was changed."""
+    egm_port: int | None = Field(default=None, gt=0, lt=65536)
+    """UDP port of this computer where the controller's EGM feedback arrives; null for none."""
 
 
 RobotFile = Annotated[SimulatedRobot | UniversalRobot | AbbRobot, Field(discriminator="driver")]
