@@ -21,6 +21,7 @@ FloatImage = NDArray[np.float32]
 _FIRST_LEVEL_PIXELS = 0.4e6
 _SMALLEST_SIDE_PX = 100
 _MOST_PIECES = 3
+_PARTIAL = "partial view"
 # a fit at this scale tells the shading and the bend of the lines well enough
 _GOOD_ENOUGH_SCALE = 0.5
 
@@ -54,32 +55,28 @@ def _enlarged(first: FloatArray, scale: float) -> FloatArray:
     return starts_full
 
 
-def _complete(image: FloatImage, grid: Grid) -> Fitted | Rejected:
-    """The grid fitted on the level's image with its gaps filled, if every corner is there."""
+def _filled(image: FloatImage, grid: Grid) -> tuple[Fitted, int]:
+    """The grid fitted on the level's image with its gaps filled, and how many corners are there."""
     filled = with_predictions(grid)
-    if not np.isfinite(filled.corners_px).all():
-        return Rejected("the corners found do not lie on a plane")
     fitted = fit_grid(image, starts(image, filled.corners_px))
-    doubt = doubtful(fitted, filled.corners_px, grid.first_dark)
-    if doubt.any():
-        seen = int((~doubt).sum())
-        return Rejected(f"partial view: {seen} of {doubt.size} corners are there")
-    return fitted
+    return fitted, int((~doubtful(fitted, filled.corners_px, grid.first_dark)).sum())
 
 
 def _on_level(image: FloatImage, board: Board) -> tuple[Grid, Fitted] | Rejected:
-    reason = Rejected("no chessboard corners in the picture")
+    reasons, most = [Rejected("no chessboard corners in the picture")], 0
     for lattice in grow_lattices(find_candidates(image))[:_MOST_PIECES]:
         placed = place_board(lattice, board)
         if isinstance(placed, Rejected):
-            reason = reason if "partial" in reason.reason else placed
+            reasons.append(placed)
             continue
-        for grid in placed:
-            fitted = _complete(image, in_board_order(grid, board))
-            if isinstance(fitted, Fitted):
-                return in_board_order(grid, board), fitted
-            reason = fitted
-    return reason
+        for grid in (in_board_order(grid, board) for grid in placed):
+            fitted, seen = _filled(image, grid)
+            if seen == board.corner_count:
+                return grid, fitted
+            most = max(most, seen)
+    if most:
+        return Rejected(f"{_PARTIAL}: {most} of {board.corner_count} corners are there")
+    return reasons[1] if len(reasons) > 1 else reasons[0]
 
 
 def _found(image: FloatImage, board: Board) -> Iterator[tuple[float, Grid, Fitted] | Rejected]:
@@ -101,7 +98,7 @@ def find_chessboard(image: FloatImage, board: Board) -> tuple[Fitted, NDArray[np
     best: Rejected | None = None
     for found in _found(image, board):
         if isinstance(found, Rejected):
-            best = found if best is None or "partial" in found.reason else best
+            best = found if best is None or _PARTIAL in found.reason else best
             continue
         scale, grid, coarse = found
         first = _enlarged(coarse.parameters, scale)
@@ -113,4 +110,4 @@ def find_chessboard(image: FloatImage, board: Board) -> tuple[Fitted, NDArray[np
             )
             continue
         return fine, doubt
-    return best or Rejected("the picture is too small")
+    return Rejected("the picture is too small") if best is None else best

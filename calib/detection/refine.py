@@ -113,8 +113,12 @@ def starts(
     return guess
 
 
-def _image_gradient(values: FloatArray, steps: FloatArray) -> FloatArray:
-    """(rows, cols, 2) image gradient of a quantity known at the corners."""
+def _image_gradient(values: FloatArray, steps: FloatArray, *, vague: bool) -> FloatArray:
+    """(rows, cols, 2) image gradient of a quantity known at the corners.
+
+    `vague` values are first smoothed over the whole board.
+    """
+    values = _quadratic(values) if vague else values
     by_col = np.gradient(values, axis=1)
     by_row = np.gradient(values, axis=0)
     det = steps[..., 0] * steps[..., 3] - steps[..., 1] * steps[..., 2]
@@ -123,34 +127,30 @@ def _image_gradient(values: FloatArray, steps: FloatArray) -> FloatArray:
     return np.stack([gx, gy], axis=-1)
 
 
-def _box3(values: FloatArray) -> FloatArray:
-    padded = np.pad(values, 1, mode="edge")
-    rows, cols = values.shape
-    return np.asarray(
-        sum(padded[i : i + rows, j : j + cols] for i in range(3) for j in range(3)) / 9
-    )
-
-
 def _quadratic(values: FloatArray) -> FloatArray:
-    """The values replaced by the quadratic surface through them."""
+    """The values, some of them NaN, replaced by the quadratic surface through them."""
     row, col = np.meshgrid(*(np.linspace(-1, 1, n) for n in values.shape), indexing="ij")
     basis = np.stack([np.ones_like(row), row, col, row * row, row * col, col * col], axis=-1)
     basis = basis.reshape(-1, 6)
-    weights = np.linalg.lstsq(basis, values.reshape(-1), rcond=None)[0]
+    known = np.isfinite(values.reshape(-1))
+    weights = np.linalg.lstsq(basis[known], values.reshape(-1)[known], rcond=None)[0]
     return np.asarray((basis @ weights).reshape(values.shape))
 
 
 def _curvature(corners_px: FloatArray, axis: int) -> FloatArray:
-    """(rows, cols) bend of the lattice line along `axis`, 1/pixel, positive towards its normal."""
+    """(rows, cols) bend of the lattice line along `axis`, 1/pixel, positive towards its normal.
+
+    A lens bends lines more and more away from its axis: the surface of second order through
+    the second differences, which the outermost corners lack.
+    """
     line = np.moveaxis(corners_px, axis, 0)
-    step = np.gradient(line, axis=0)
-    bend = np.zeros_like(line)
+    bend = np.full(line.shape[:2], np.nan)
     if len(line) >= 3:
-        bend[1:-1] = line[2:] - 2 * line[1:-1] + line[:-2]
-        bend[0], bend[-1] = bend[1], bend[-2]
-    length = np.linalg.norm(step, axis=-1)
-    turning = (step[..., 0] * bend[..., 1] - step[..., 1] * bend[..., 0]) / length**3
-    return _box3(np.moveaxis(turning, 0, axis))
+        step = 0.5 * (line[2:] - line[:-2])
+        second = line[2:] - 2 * line[1:-1] + line[:-2]
+        turning = step[..., 0] * second[..., 1] - step[..., 1] * second[..., 0]
+        bend[1:-1] = turning / np.linalg.norm(step, axis=-1) ** 3
+    return _quadratic(np.moveaxis(bend, 0, axis))
 
 
 def _blur_share(parameters: FloatArray) -> float:
@@ -164,10 +164,10 @@ def _shapes(fitted: FloatArray | None, steps: FloatArray) -> FloatArray:
     shapes = np.zeros((*steps.shape[:2], 6))
     if fitted is not None:
         # wide blur leaves each corner's own levels too vague for differences between them
-        smooth = _quadratic if _blur_share(fitted) > _VAGUE_BLUR else _box3
-        sign = np.sign(fitted[..., CONTRAST])[..., None]
-        shapes[..., 0:2] = _image_gradient(smooth(fitted[..., MEAN]), steps)
-        shapes[..., 2:4] = sign * _image_gradient(smooth(np.abs(fitted[..., CONTRAST])), steps)
+        vague = _blur_share(fitted) > _VAGUE_BLUR
+        size, sign = np.abs(fitted[..., CONTRAST]), np.sign(fitted[..., CONTRAST])
+        shapes[..., 0:2] = _image_gradient(fitted[..., MEAN], steps, vague=vague)
+        shapes[..., 2:4] = sign[..., None] * _image_gradient(size, steps, vague=vague)
         shapes[..., 4] = _curvature(fitted[..., [X, Y]], axis=1)
         shapes[..., 5] = _curvature(fitted[..., [X, Y]], axis=0)
     return shapes
@@ -268,6 +268,7 @@ def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray
         np.isfinite(fitted.residual)
         & (moved < 0.3 * shortest)
         & (contrast > 0.2 * typical)
-        & (fitted.residual < 0.5 * np.abs(contrast))
+        & (contrast < 2.0 * typical)
+        & (fitted.residual < 0.12 * typical + 2.5 * float(np.nanmedian(fitted.residual)))
     )
     return np.asarray(~fine)

@@ -94,7 +94,9 @@ def _boxed_edge(d: float, s: float, nx: float, ny: float) -> tuple[float, float,
 def _edge(d: float, s: float, nx: float, ny: float) -> tuple[float, float, float]:
     """The edge's profile, its slope, and its derivative by the width."""
     if s < _BOX_BELOW_PX:
-        return _boxed_edge(d, math.sqrt(max(s * s - PIXEL_VARIANCE, _SMALLEST_WIDTH_PX**2)), nx, ny)
+        blur = math.sqrt(max(s * s - PIXEL_VARIANCE, _SMALLEST_WIDTH_PX**2))
+        value, slope, widening = _boxed_edge(d, blur, nx, ny)
+        return value, slope, widening * s / blur
     return _gaussian_edge(d, s)
 
 
@@ -253,7 +255,8 @@ def _normal_equations(p: Any, pixels: Any, count: int, shape: Any, A: Any, g: An
     """Fill A = J^T J and g = J^T r; the sum of squared residuals is returned.
 
     `shape` holds the given (not fitted) terms: gradients of mean and contrast (4), curvatures
-    of the two edges (2).
+    of the two edges (2). Where the gradients' plane is pinned down moves with the corner; that
+    is not in J, since the fitted mean and contrast make it good.
     """
     A[:] = 0.0
     g[:] = 0.0
@@ -346,6 +349,8 @@ def _fit(
     pixels = np.empty((int((4.0 * reach_px + 8.0) ** 2), 7))
     for i in range(M):
         p = fitted[i]
+        if not (np.isfinite(p).all() and np.isfinite(steps[i]).all()):
+            continue
         longest = max(math.hypot(steps[i, 0], steps[i, 1]), math.hypot(steps[i, 2], steps[i, 3]))
         count = _gather(image, p, steps[i], lines[i], min(reach, reach_px / longest), clear, pixels)
         if count <= PARAMETERS + 4:

@@ -1,0 +1,68 @@
+import cv2
+import numpy as np
+import pytest
+from board_rendering import photograph
+
+from calib.detection import Rejected, detect
+from calib.views import Board
+
+BOARD = Board("charuco", 6, 4, 0.03, 0.022, "DICT_5X5_100")
+OVERSAMPLING = 6
+
+
+def photographed(blur_px=1.0, *, legacy=False, shift=(0.0, 0.0)):
+    """The board seen aslant, drawn by OpenCV and scaled down; and its true corners."""
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
+    layout = cv2.aruco.CharucoBoard((5, 7), 0.03, 0.022, dictionary)
+    layout.setLegacyPattern(legacy)
+    per_square = 70 * 4
+    flat = layout.generateImage((5 * per_square, 7 * per_square), marginSize=0)
+    # a sample of the large picture lies at (x + 0.5) / OVERSAMPLING - 0.5 of the small one
+    corners = np.float32([[160, 60], [470, 95], [440, 440], [130, 400]]) + np.float32(shift)
+    to = (corners + 0.5) * OVERSAMPLING - 0.5
+    frame = np.float32([[0, 0], [5, 0], [5, 7], [0, 7]])
+    H = cv2.getPerspectiveTransform(frame * per_square - 0.5, to)
+    size = (640 * OVERSAMPLING, 480 * OVERSAMPLING)
+    large = cv2.warpPerspective(flat, H, size, flags=cv2.INTER_LINEAR, borderValue=255)
+    small = cv2.resize(large, (640, 480), interpolation=cv2.INTER_AREA).astype(float)
+    image = cv2.GaussianBlur(40 + 0.65 * small, (0, 0), blur_px)
+    place = BOARD.corners_m[:, :2] / BOARD.square_m + 1
+    truth = cv2.perspectiveTransform(place[None] * per_square - 0.5, H.astype(float))[0]
+    return image, (truth + 0.5) / OVERSAMPLING - 0.5
+
+
+@pytest.mark.parametrize("blur_px", [0.8, 1.5])
+def test_corners_beside_markers_are_as_good_as_any(blur_px):
+    image, truth = photographed(blur_px)
+    found = detect(photograph(image), BOARD)
+    assert found, found.reason
+    assert found.upside_down_known
+    error = found.corners_px - truth
+    assert np.sqrt(np.square(error).mean()) < 0.025
+    assert np.abs(error.mean(axis=0)).max() < 0.01
+    assert found.frame_blur_px == pytest.approx(blur_px, rel=0.15)
+
+
+def test_unseen_corners_are_nan_and_the_others_keep_their_names():
+    image, truth = photographed(1.0)
+    image[250:] = 90.0
+    found = detect(photograph(image), BOARD)
+    assert found
+    seen = np.isfinite(found.corners_px[:, 0])
+    assert not seen[truth[:, 1] > 250].any()
+    assert seen[truth[:, 1] < 230].all()
+    assert np.abs(found.corners_px[seen] - truth[seen]).max() < 0.15
+    assert np.isnan(found.sigma_px[~seen]).all()
+
+
+def test_a_picture_without_its_markers_is_rejected():
+    rejected = detect(np.full((480, 640), 128, np.uint8), BOARD)
+    assert isinstance(rejected, Rejected)
+    assert "markers" in rejected.reason
+
+
+def test_a_board_described_without_markers_is_rejected():
+    image, _ = photographed()
+    rejected = detect(photograph(image), Board("charuco", 6, 4, 0.03))
+    assert isinstance(rejected, Rejected)
+    assert "dictionary" in rejected.reason
