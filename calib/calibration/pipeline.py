@@ -70,13 +70,13 @@ def calibrate(views: Views) -> Calibration:
         position_error={} if robot is None else _position_errors(views, solutions, robot),
         missing=missing,
         image_size_px=(views.width_px, views.height_px),
-        distance_range_m=_distance_range_m(views, baseline),
+        distance_range_m=_distance_range_m(views, solutions.get("joint_ml", baseline.mle)),
     )
 
 
-def _distance_range_m(views: Views, baseline: Baseline) -> tuple[float, float]:
-    depth = board_depth_m(views, baseline.mle.camera_from_board)[baseline.used]
-    return float(depth.min()), float(depth.max())
+def _distance_range_m(views: Views, solution: Solution) -> tuple[float, float]:
+    depth = board_depth_m(views, solution.camera_from_board)
+    return float(np.nanmin(depth)), float(np.nanmax(depth))
 
 
 def _robot(views: Views, baseline: Baseline, missing: dict[str, str]) -> RobotFit | None:

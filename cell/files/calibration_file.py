@@ -120,6 +120,24 @@ class Consistency(_Part):
     rms_rad: Sigma
 
 
+class FocusPart(_Part):
+    """How alpha and beta follow the distance by this solution's own fit."""
+
+    law: Literal["inverse_square", "thin_lens"]
+    parameters: dict[str, ParameterPart]
+
+
+class CovariancePart(_Part):
+    """Covariance of the numbers fitted together, in the units their names tell.
+
+    Transforms are freed by increments (x, y, z, rx, ry, rz) in their second-named frame. Where
+    the focus moves, alpha and beta are the law's own, far away.
+    """
+
+    names: tuple[str, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+
 class SolutionPart(_Part):
     """One camera model."""
 
@@ -132,7 +150,9 @@ class SolutionPart(_Part):
     k2: float
     at_distance_m: float | None
     """Where alpha and beta move with distance: the distance they are told at."""
+    focus: FocusPart | None = None
     sigma: dict[str, Sigma]
+    covariance: CovariancePart | None = None
     reprojection_px: Reprojection
     camera_position_error_m: PositionErrorPart | None
     robot_consistency: Consistency | None
@@ -174,6 +194,10 @@ class CalibrationFile(_Part):
 
     schema_: Literal["cell.calibration/1"] = Field(alias="schema")
     recording: str
+    image_size_px: tuple[int, int] | None = None
+    """Width and height."""
+    distance_range_m: tuple[PositiveFloat, PositiveFloat] | None = None
+    """Nearest and farthest board centre in the frames used."""
     frames_used: tuple[int, ...]
     frames_rejected: tuple[RejectedFrame, ...]
     scale_factors: tuple[ScaleFactorPart, ...]
