@@ -136,6 +136,14 @@ class Present:
     effect: Effect
     values: FloatArray
 
+    @property
+    def absent(self) -> bool:
+        """True when every amount is zero: it changes nothing."""
+        return not any(
+            value and parameter.role == "amount"
+            for value, parameter in zip(self.values, self.effect.parameters, strict=True)
+        )
+
     def as_mapping(self) -> dict[str, float]:
         """Parameter name to value."""
         return {p.name: float(v) for p, v in zip(self.effect.parameters, self.values, strict=True)}

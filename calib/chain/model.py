@@ -72,7 +72,7 @@ def start(model: CellModel, views: Views, kinematics: ArmKinematics | None) -> W
 def _act(walk: Walk, model: CellModel, links: tuple[Link, ...]) -> None:
     for link in links:
         for present in model.effects:
-            if present.effect.link == link:
+            if present.effect.link == link and not present.absent:
                 present.effect.act(present.values, walk)
 
 

@@ -57,27 +57,29 @@ def unknowns_of(
 def moved(model: CellModel, unknowns: tuple[Unknown, ...], step: FloatArray) -> CellModel:
     """The cell after adding (p,) `step` to its free numbers; transforms move on their own side."""
     optics = model.optics.copy()
-    values = [present.values.copy() for present in model.effects]
+    effects = list(model.effects)
     increments = {"flange_from_mounted": np.zeros(6), "base_from_fixed": np.zeros(6)}
     for unknown, amount in zip(unknowns, step, strict=True):
         kind, at, k = unknown.place
         if kind == "optics":
             optics[at] += amount
         elif kind == "effect":
-            parameter = model.effects[at].effect.parameters[k]
-            values[at][k] = np.clip(values[at][k] + amount, parameter.low, parameter.high)
+            effects[at] = _nudged(effects[at], k, float(amount))
         else:
             increments[kind][at] += amount
-    return replace(
-        model,
-        optics=optics,
-        flange_from_mounted=model.flange_from_mounted
-        @ rigid.from_vector(increments["flange_from_mounted"]),
-        base_from_fixed=model.base_from_fixed @ rigid.from_vector(increments["base_from_fixed"]),
-        effects=tuple(
-            Present(present.effect, v) for present, v in zip(model.effects, values, strict=True)
-        ),
-    )
+    changed = {
+        frame: getattr(model, frame) @ rigid.from_vector(increment)
+        for frame, increment in increments.items()
+        if increment.any()
+    }
+    return replace(model, optics=optics, effects=tuple(effects), **changed)
+
+
+def _nudged(present: Present, k: int, amount: float) -> Present:
+    parameter = present.effect.parameters[k]
+    values = present.values.copy()
+    values[k] = min(max(values[k] + amount, parameter.low), parameter.high)
+    return Present(present.effect, values)
 
 
 @dataclass(frozen=True)
@@ -132,10 +134,9 @@ def dependence(
     d_points = np.zeros((p, *state.points_m.shape))
     back = rigid.inverse(state.camera_from_board)
     for k, unknown in enumerate(unknowns):
-        step = np.zeros(p)
-        step[k] = unknown.typical * _STEP_SHARE
-        plus, minus = run(moved(model, unknowns, step)), run(moved(model, unknowns, -step))
-        width = 2.0 * step[k]
+        step = np.array([unknown.typical * _STEP_SHARE])
+        plus, minus = run(moved(model, (unknown,), step)), run(moved(model, (unknown,), -step))
+        width = 2.0 * step[0]
         d_optics[:, :, k] = (plus.optics - minus.optics) / width
         d_points[k] = (plus.points_m - minus.points_m) / width
         ahead = rigid.to_vector(plus.camera_from_board @ back)
