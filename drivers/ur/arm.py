@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from typing import Any
 
@@ -25,6 +26,7 @@ from drivers.ur.speed import leading_joint_speed_rad_s, tcp_speed_m_s
 from drivers.ur.status import fault_in
 from drivers.ur.supervisor import Supervisor, at_rest
 
+_log = logging.getLogger("cell.drivers")
 _JOINT_LIMIT_RAD = 6.3
 _UNLOCK_CONFIRM_S = 2.0
 
@@ -177,6 +179,13 @@ class URArm:
         if fault is not None:
             raise ArmStopped(self._named(fault))
         self.kinematics = read_kinematics(self._host)
+        if self.kinematics is None:
+            _log.warning(
+                self._named(
+                    "tells no kinematics on port 30001, so joint moves are slowed down as if the "
+                    "arm were stretched out"
+                )
+            )
         self._supervisor = Supervisor(self._host, self._settings, self._reader)
         self._supervisor.prepare()
         self._wait_ready(self._supervisor)

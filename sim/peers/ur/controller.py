@@ -12,6 +12,7 @@ import time
 from dataclasses import dataclass
 from enum import IntEnum
 
+from calib.chain.kinematics import ArmKinematics
 from drivers.arm import Arm, ArmState, Motion, MoveTarget
 from drivers.errors import DeviceError, SafetyError
 from drivers.ur.pose import base_from_tcp, pose_of
@@ -68,9 +69,9 @@ class URController:
         The arm it moves, in process.
     address:
         A loopback address of its own.
-    dh:
-        Denavit-Hartenberg parameters as (theta, a, d, alpha), six numbers each, which the primary
-        port reports as the factory calibration; None to report none.
+    kinematics:
+        Whose Denavit-Hartenberg parameters the primary port reports as the factory calibration;
+        None to report none.
     rate_hz:
         Cycle of the control loop and highest RTDE rate.
 
@@ -91,12 +92,12 @@ class URController:
         arm: Arm,
         address: str = "127.0.0.2",
         *,
-        dh: tuple[tuple[float, ...], ...] | None = None,
+        kinematics: ArmKinematics | None = None,
         rate_hz: float = 125.0,
     ) -> None:
         self.arm = arm
         self.address = address
-        self.dh = dh
+        self.kinematics = kinematics
         self.rate_hz = rate_hz
         self.version = (5, 12, 6, 1102099)
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6

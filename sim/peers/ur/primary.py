@@ -37,9 +37,9 @@ class PrimaryServer:
 
     def _state(self) -> bytes:
         mode = _package(_ROBOT_MODE, bytes(41))
-        if self._controller.dh is None:
+        if self._controller.kinematics is None:
             return mode
-        theta, a, d, alpha = self._controller.dh
+        theta, d, a, alpha = self._controller.kinematics.dh.T
         body = struct.pack(">6I24dI", *range(6), *theta, *a, *d, *alpha, _LINEARISED)
         return mode + _package(_KINEMATICS, body)
 

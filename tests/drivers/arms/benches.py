@@ -65,8 +65,7 @@ def simulated(model: str, home: tuple[float, ...]) -> SimArm:
 @contextmanager
 def ur_peer() -> Iterator[tuple[URController, SimArm]]:
     sim = simulated("ur5e", UR_HOME)
-    theta, d, a, alpha = (tuple(column) for column in kinematics_of("ur5e").dh.T)
-    with URController(sim, own_address(), dh=(theta, a, d, alpha)) as controller:
+    with URController(sim, own_address(), kinematics=kinematics_of("ur5e")) as controller:
         yield controller, sim
 
 

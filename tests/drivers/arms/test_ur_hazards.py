@@ -409,14 +409,14 @@ def test_the_factory_kinematics_are_read_and_put_the_flange_where_the_controller
         joints = np.random.default_rng(0).uniform(-2, 2, (5, 6))
         expected = kinematics_of("ur5e").forward(joints)[:, :3, 3]
         assert found.flange_positions_m(joints) == pytest.approx(expected, abs=1e-12)
-        controller.dh = None
+        controller.kinematics = None
         assert read_kinematics(controller.address, timeout_s=0.3) is None
 
 
 @pytest.mark.parametrize("told", [True, False], ids=["kinematics told", "not told"])
 def test_the_flange_never_exceeds_its_speed_in_a_joint_move(told):
     with ur_peer() as (controller, sim):
-        controller.dh = controller.dh if told else None
+        controller.kinematics = controller.kinematics if told else None
         arm = URArm(controller.address)
         arm.connect()
         goal = (UR_HOME[0] + (0.2 if told else 0.05), *UR_HOME[1:])
