@@ -40,7 +40,13 @@ class FeatureNames:
     gain: tuple[str, ...] = ("Gain",)
     gain_is_factor: bool = False
     temperature: str = "DeviceTemperature"
-    autos: tuple[str, ...] = ("ExposureAuto", "GainAuto", "BlackLevelAuto", "BalanceWhiteAuto")
+    autos: tuple[str, ...] = (
+        "ExposureAuto",
+        "GainAuto",
+        "BlackLevelAuto",
+        "BalanceWhiteAuto",
+        "FocusAuto",
+    )
     full_frame: tuple[tuple[str, int | str], ...] = (
         ("BinningHorizontal", 1),
         ("BinningVertical", 1),
@@ -75,7 +81,7 @@ class CameraSettings:
         Raises `DeviceRefused` where the camera does not have what was set.
         """
         for name in self._names.autos:
-            if self._features.has(name):
+            if self._features.has(name) and self._features.read(name) != "Off":
                 self._set(name, "Off")
         for name, value in self._names.full_frame:
             self._set_full_frame(name, value)

@@ -13,6 +13,7 @@ from sim.peers.gige.registers import STREAM_ADDRESS, STREAM_PORT, RegisterMap
 from sim.peers.gige.streamer import Acquisition, Streamer
 
 _TICK_S = 1e-9
+_ONCE = 1
 
 
 class Behaviour:
@@ -46,7 +47,7 @@ class Behaviour:
                 self._update_payload_size()
             case "FocusStepper":
                 self._lens.move_to(int(value))
-            case "FocusAuto" if value:
+            case "FocusAuto" if value == _ONCE:
                 self._lens.focus_once()
                 self._registers.set("FocusAuto", 0)
             case "OpticControllerInitialize" | "FocusInitialize":

@@ -1,8 +1,9 @@
 """A GigE Vision camera on loopback whose pictures come from any `drivers.camera.Camera`.
 
-What it does of the AIA GigE Vision Specification 2.0: discovery, control privilege with heartbeat
-expiry, register and memory access, test packets, one stream channel with packet size, packet delay
-and resend. What it does not: events, actions, ForceIP, chunks, extended ids, pending acknowledges.
+What it does of the AIA GigE Vision Specification 2.0: discovery when asked by address, control
+privilege with heartbeat expiry, register and memory access, test packets, one stream channel with
+packet size, packet delay and resend. What it does not: events, actions, ForceIP, chunks, extended
+ids, pending acknowledges.
 """
 
 from __future__ import annotations
@@ -52,8 +53,6 @@ class GigEPeer:
         Range and speed of the lens's stepper; None for a lens without one.
     link_bytes_s:
         Rate of the link; 125e6 is Gigabit Ethernet.
-    answer_discovery_broadcast:
-        Also answer broadcasts, which reach it from other machines too.
     """
 
     def __init__(
@@ -68,7 +67,6 @@ class GigEPeer:
         focus_steps: int | None = 10000,
         focus_steps_s: float = 20000.0,
         link_bytes_s: float = 125e6,
-        answer_discovery_broadcast: bool = False,
         seed: int = 0,
     ) -> None:
         if not ipaddress.IPv4Address(address).is_loopback:
@@ -79,8 +77,6 @@ class GigEPeer:
         self._focus = focus_steps, focus_steps_s
         self._at_power_on: tuple[dict[str, float], int | None] | None = None
         self._link, self._seed = link_bytes_s, seed
-        self._broadcast = answer_discovery_broadcast
-        self._sockets: list[socket.socket] = []
         self._thread: threading.Thread | None = None
 
     def start(self) -> GigEPeer:
@@ -97,9 +93,8 @@ class GigEPeer:
         self._behaviour = Behaviour(self.registers, self.streamer, lens, self._source)
         self.registers.set_word(0x0D1C, self.streamer.port)
         self.control = ControlPrivilege()
-        self._sockets = [_bound((self.address, gvcp.PORT))]
-        if self._broadcast:
-            self._sockets.append(_bound(("255.255.255.255", gvcp.PORT)))
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind((self.address, gvcp.PORT))
         self._powered = True
         self._thread = threading.Thread(target=self._serve, daemon=True, name="gige control")
         self._thread.start()
@@ -125,8 +120,7 @@ class GigEPeer:
         self.streamer.halt()
         self._thread.join()
         self._thread = None
-        for each in self._sockets:
-            each.close()
+        self._socket.close()
         self.streamer.close()
 
     close = kill
@@ -141,9 +135,9 @@ class GigEPeer:
 
     def _serve(self) -> None:
         while self._powered:
-            ready, _, _ = select.select(self._sockets, [], [], 0.02)
-            for each in ready:
-                packet, host = each.recvfrom(2048)
+            ready, _, _ = select.select([self._socket], [], [], 0.02)
+            if ready:
+                packet, host = self._socket.recvfrom(2048)
                 request = gvcp.parse(packet)
                 if request and not self.faults.mute:
                     self._answer(request, host)
@@ -160,7 +154,7 @@ class GigEPeer:
         if request.wants_answer:
             time.sleep(self.faults.answer_delay_s)
             with contextlib.suppress(OSError):
-                self._sockets[0].sendto(answer, host)
+                self._socket.sendto(answer, host)
 
     def _do(self, request: gvcp.Request, host: Host) -> bytes:
         payload = request.payload
@@ -224,11 +218,3 @@ class GigEPeer:
                 self.streamer.send_raw(probe_packet(value & 0xFFFF), host)
         else:
             self.registers.set_word(address, value)
-
-
-def _bound(address: tuple[str, int]) -> socket.socket:
-    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    if address[0] == "255.255.255.255":
-        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    made.bind(address)
-    return made

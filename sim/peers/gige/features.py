@@ -113,9 +113,9 @@ def device_features(width: int, height: int) -> tuple[Feature, ...]:
         Feature("Gain", "AnalogControl", "float", 0.0, 0.0, 24.0, "dB"),
         _enumeration("GainAuto", "AnalogControl", _OFF_ONCE_CONTINUOUS, default=2),
         Feature("PayloadSize", transport, "integer", width * height, access="RO"),
-        _fixed("GevSCPSPacketSize", STREAM_PACKET_SIZE),
-        _fixed("GevSCPD", STREAM_PACKET_DELAY),
-        _fixed("GevHeartbeatTimeout", HEARTBEAT_TIMEOUT),
+        _fixed("GevSCPSPacketSize", STREAM_PACKET_SIZE, 0xFFFF),
+        _fixed("GevSCPD", STREAM_PACKET_DELAY, 0x7FFFFFFF),
+        _fixed("GevHeartbeatTimeout", HEARTBEAT_TIMEOUT, 0xFFFF),
     )
 
 
@@ -129,12 +129,12 @@ def optic_features(steps: int) -> tuple[Feature, ...]:
         _enumeration("FocusStatus", optic, OPTIC_STATUS, access="RO"),
         Feature("FocusInitialize", optic, "command", access="WO"),
         Feature("FocusStepper", optic, "integer", 0, 0, steps),
-        _enumeration("FocusAuto", optic, {"Off": 0, "Once": 1}),
+        _enumeration("FocusAuto", optic, _OFF_ONCE_CONTINUOUS, default=2),
     )
 
 
-def _fixed(name: str, address: int) -> Feature:
-    return Feature(name, "TransportLayerControl", "integer", low=0, high=65535, address=address)
+def _fixed(name: str, address: int, high: int) -> Feature:
+    return Feature(name, "TransportLayerControl", "integer", low=0, high=high, address=address)
 
 
 def xml_of(layout: dict[int, Feature], model: str) -> bytes:

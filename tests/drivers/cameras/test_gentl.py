@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,11 @@ def test_a_file_that_is_no_producer_is_refused_without_a_traceback(tmp_path: Pat
     fake = tmp_path / "fake.cti"
     fake.write_text("not a library")
     assert "GenTL producer" in refusal(GenTLCamera(str(fake)))
+
+
+def test_without_harvesters_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "harvesters", None)
+    assert "calibration-cell[genicam]" in refusal(GenTLCamera(VIKY))
 
 
 def test_the_producer_is_found_on_the_search_path(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator
 
@@ -133,6 +134,17 @@ def test_packets_too_long_for_the_network_are_named(peer: GigEPeer) -> None:
     fitting.close()
 
 
+def test_packets_leave_no_faster_than_the_packet_delay_says(peer: GigEPeer) -> None:
+    delay_s, packets = 2e-3, WIDTH * HEIGHT // 8000
+    options = GenICamOptions(exposure_s=0.001, features={"GevSCPD": round(delay_s * 1e9)})
+    camera = AravisCamera(peer.address, options, packet_bytes=8000)
+    camera.connect()
+    begun_s = time.monotonic()
+    camera.grab(5.0)
+    assert time.monotonic() - begun_s > packets * delay_s
+    camera.close()
+
+
 def test_an_exposure_longer_than_the_time_out_is_refused_before_the_trigger(
     camera: AravisCamera, peer: GigEPeer
 ) -> None:
@@ -216,11 +228,11 @@ def test_a_camera_that_a_crashed_program_held_is_waited_for(peer: GigEPeer) -> N
 
 
 def test_every_automatism_is_off_after_connecting(camera: AravisCamera, peer: GigEPeer) -> None:
-    assert [peer.registers.get(name) for name in ("ExposureAuto", "GainAuto", "FocusAuto")] == [
-        0,
-        0,
-        0,
-    ]
+    autos = ("ExposureAuto", "GainAuto", "FocusAuto")
+    assert [peer.registers.get(name) for name in autos] == [0, 0, 0]
+    peer.kill()
+    peer.start()
+    assert all(peer.registers.get(name) for name in autos)
 
 
 def test_features_of_the_cell_file_are_set_and_bad_ones_refused(peer: GigEPeer) -> None:
@@ -250,6 +262,14 @@ def test_the_driver_says_that_it_was_never_tried_on_a_real_camera(
     camera.close()
     said = [r for r in caplog.records if "never on the real machine" in r.message]
     assert len(said) == 1
+
+
+def test_without_pygobject_the_packages_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "gi", None)
+    camera = AravisCamera("127.0.0.1")
+    with pytest.raises(DeviceRefused, match=r"apt-get install python3-gi gir1\.2-aravis-0\.8"):
+        camera.connect()
+    camera.close()
 
 
 def test_errors_are_device_errors(camera: AravisCamera, peer: GigEPeer) -> None:

@@ -18,6 +18,7 @@ from tests.drivers.cameras.rigs import loopback_address
 
 READ_REGISTER, WRITE_REGISTER, READ_MEMORY = 0x80, 0x82, 0x84
 CONTROL_PRIVILEGE, HEARTBEAT_MS, FIRST_URL = 0x0A00, 0x0938, 0x0200
+STREAM_PORT, PACKET_SIZE, STREAM_ADDRESS = 0x0D00, 0x0D04, 0x0D18
 SUCCESS, INVALID_ADDRESS, WRITE_PROTECT, ACCESS_DENIED = 0, 0x8003, 0x8004, 0x8006
 
 
@@ -104,6 +105,24 @@ def test_what_is_not_there_or_read_only_is_refused(host: Host) -> None:
     host.write(CONTROL_PRIVILEGE, 2)
     assert host.ask(READ_MEMORY, struct.pack(">IHH", 0x00F00000, 0, 4))[0] == INVALID_ADDRESS
     assert host.write(0x0000, 5) == WRITE_PROTECT
+
+
+def test_a_test_packet_has_the_size_asked_for_if_the_network_carries_it(
+    peer: GigEPeer, host: Host
+) -> None:
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    receiver.bind(("127.0.0.1", 0))
+    receiver.settimeout(0.3)
+    host.write(CONTROL_PRIVILEGE, 2)
+    host.write(STREAM_ADDRESS, int.from_bytes(socket.inet_aton("127.0.0.1"), "big"))
+    host.write(STREAM_PORT, receiver.getsockname()[1])
+    peer.faults.largest_packet_bytes = 1500
+    host.write(PACKET_SIZE, 0x80000000 | 1500)
+    assert len(receiver.recv(9000)) == 1500 - 28
+    host.write(PACKET_SIZE, 0x80000000 | 4000)
+    with pytest.raises(TimeoutError):
+        receiver.recv(9000)
+    receiver.close()
 
 
 def test_a_killed_device_answers_nothing_and_comes_back_forgetful(
