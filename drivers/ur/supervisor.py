@@ -27,7 +27,7 @@ from drivers.ur.settings import URSettings
 from drivers.ur.status import Runtime, fault_in
 from drivers.ur.stop_paths import StopPaths
 
-AT_REST_RAD_S = 0.005
+AT_REST_RAD_S = 0.01
 _CYCLE_S = 0.01
 _BEAT_S = 0.2
 _RESEND_S = 0.05
