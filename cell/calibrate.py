@@ -21,8 +21,13 @@ from calib.views import Views
 from cell.errors import BadAnswer, InputError
 from cell.files.calibration_file import CalibrationFile
 from cell.recording import Corners, FrameRecord, Recording, write_corners
-from cell.report import ReportData, solution_poses, solution_residuals, write_report
-from cell.report.data import Image, Thumbnail
+from cell.report import (
+    ReportData,
+    recording_data,
+    solution_poses,
+    solution_residuals,
+    write_report,
+)
 
 FILE_NAME = "calibration.json"
 log = logging.getLogger(__name__)
@@ -183,33 +188,14 @@ def report_data(
     recording: Recording, calibrated: Calibrated, *, simulated: bool = False
 ) -> ReportData:
     """What the report shows of a calibration alone."""
-    return ReportData(
-        views=calibrated.views,
-        recording=recording.header.as_mapping(),
+    data = recording_data(recording, calibrated.views)
+    return replace(
+        data,
         calibration=calibrated.mapping,
         residuals_px=solution_residuals(calibrated.result),
         poses=solution_poses(calibrated.result, calibrated.views),
-        simulated=simulated,
-        thumbnail=_thumbnails(recording),
+        simulated=simulated or data.simulated,
     )
-
-
-def _thumbnails(recording: Recording) -> Thumbnail:
-    """Pictures by frame number, grey, None where a frame has none that can be read."""
-    by_number = {frame.frame: frame for frame in recording.frames}
-
-    def picture(number: int) -> Image | None:
-        frame = by_number.get(number)
-        if frame is None or frame.image is None:
-            return None
-        try:
-            image = recording.image(frame)
-        except InputError:
-            return None
-        depth = 257 if image.dtype == np.uint16 else 1
-        return (image.astype(np.float32) / depth).astype(np.uint8)
-
-    return picture
 
 
 def write_calibration(calibrated: Calibrated, folder: Path, corners: Corners | None = None) -> Path:

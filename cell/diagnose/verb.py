@@ -25,13 +25,12 @@ from cell.calibrate import (
     report_data,
     same_order_everywhere,
 )
-from cell.diagnose.evidence import evidence_of
 from cell.diagnose.mapping import as_mapping
 from cell.diagnose.prediction import AFTER, BEFORE, write_prediction
 from cell.diagnose.twin import twin_text
 from cell.errors import BadAnswer, InputError
 from cell.recording import Corners, Recording, frames_as_views, read_frames
-from cell.report import write_report
+from cell.report import diagnosis_evidence, write_report
 
 DIAGNOSIS = "diagnosis.json"
 TWIN = "twin.yaml"
@@ -158,6 +157,13 @@ def _report(
     if calibrated is None:
         calibrated = calibrate_recording(recording, corners)
     data = report_data(recording, calibrated, simulated=simulated)
-    rows = np.flatnonzero(np.isin(data.views.frame, found.views.frame))
-    evidence = evidence_of(found, rows, len(data.views))
+    noise = found.twin.noise
+    evidence = diagnosis_evidence(
+        data.views,
+        found.views,
+        found.plain.model,
+        found.twin.model,
+        corner_px=noise.corner_px,
+        flange_m=noise.flange_m,
+    )
     write_report(folder / REPORT, replace(data, diagnosis=mapping, evidence=evidence))

@@ -178,34 +178,48 @@ def _pose() -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _mismatch(
+    link: str, site: str, covariate: str, where: str, share: float, p_value: float
+) -> dict[str, Any]:
+    return {
+        "link": link, "site": site, "covariate": covariate, "where": where,
+        "share_of_excess": share, "p_value": p_value,
+    }  # fmt: skip
+
+
 def diagnosis(**changes: Any) -> dict[str, Any]:
     return {
         "schema": "cell.diagnosis/1",
         "verdict": "explained",
         "holdout": {"frames": [3, 9, 15], "rms_px_before": 4.21, "rms_px_after": 0.118,
-                    "noise_px": 0.104},
+                    "noise_px": 0.104, "nll_before": 310.0, "nll_after": -42.0},
         "mismatch": [
-            {"link": "lens", "covariate": "distance", "where": "0.25 to 0.45 m",
-             "share_of_excess": 0.71, "p_value": 1e-40},
-            {"link": "arm", "covariate": "joint 3", "where": "above 70°", "share_of_excess": 0.24,
-             "p_value": 3e-9},
-            {"link": "mount", "covariate": "gravity", "where": None, "share_of_excess": 0.03,
-             "p_value": 0.02},
+            _mismatch("lens", "focal length", "distance", "0.25 to 0.45 m", 0.71, 1e-40),
+            _mismatch("arm", "flange", "joint_3", "above 70°", 0.24, 3e-9),
+            _mismatch("mount", "flange_from_camera", "gravity", "all attitudes", 0.03, 0.02),
         ],
         "effects": [
             {"name": "focus_breathing", "link": "lens", "law": "inverse_square",
              "physics": "The focal length follows the focus distance.",
+             "remedy": "Lock the focus.",
              "parameters": {"k_px_m2": {"value": 5.98, "sigma": 0.05, "unit": "px m^2"}},
              "p_value": 1e-60, "holdout_gain_px": 3.9},
             {"name": "joint_compliance", "link": "arm", "law": None,
              "physics": "A joint gives way under the arm's own weight.",
+             "remedy": "Enter the true payload.",
              "parameters": {"rad_per_Nm_3": {"value": 2.1e-5, "sigma": 2e-6, "unit": "rad/Nm"}},
              "p_value": 2e-8, "holdout_gain_px": 0.21},
         ],
         "ambiguous_with": [
             {"names": ["thermal_focal_drift"], "why": "distance grew with time in this run",
+             "experiment": "take the distances in another order",
              "separate_with": "separate.yaml"},
         ],
+        "recording": "bench-3",
+        "noise": {"corner_px": 0.1, "flange_m": 4e-5, "flange_rad": 5e-5, "print_m": 0.0},
+        "frames_used": [0, 1, 2],
+        "frames_rejected": [],
+        "notes": ["temperature_c was not logged: thermal_focal_drift is looked for against time"],
         "unexplained": None,
         **changes,
     }  # fmt: skip

@@ -12,6 +12,7 @@ import pytest
 
 from calib.views import Views
 from cell.files.calibration_file import CalibrationFile
+from cell.files.diagnosis_file import DiagnosisFile
 from cell.report import ReportData, write_report
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
@@ -65,8 +66,9 @@ def full_page(tmp_path_factory: pytest.TempPathFactory) -> tuple[Strict, str]:
     return parsed(made_up_cell.full(), tmp_path_factory.mktemp("full"))
 
 
-def test_the_made_up_calibration_has_the_shape_of_the_real_file() -> None:
+def test_the_made_up_results_have_the_shape_of_the_real_files() -> None:
     CalibrationFile.model_validate(made_up_cell.full(9).calibration)
+    DiagnosisFile.model_validate(made_up_cell.diagnosis())
 
 
 def test_it_loads_nothing_from_outside(full_page: tuple[Strict, str]) -> None:
@@ -153,12 +155,18 @@ def test_a_diagnosis_alone_makes_a_report(tmp_path: Path) -> None:
 
 
 def test_what_is_unexplained_warns_in_the_first_sentence(tmp_path: Path) -> None:
-    left = {"link": "mount", "covariate": "gravity", "p_value": 1e-12, "where": "camera upright"}
+    left = {
+        "link": "mount",
+        "site": "x",
+        "covariate": "gravity",
+        "p_value": 1e-12,
+        "where": "upright",
+    }
     data = made_up_cell.full(9)
     data = replace(data, diagnosis=made_up_cell.diagnosis(verdict="unexplained", unexplained=left))
     _, text = parsed(data, tmp_path)
     assert "With care" in text
-    assert "Something real is left in the mount, along gravity, camera upright" in text
+    assert "Something real is left in the mount, along gravity, upright" in text
 
 
 def test_text_from_files_is_escaped(tmp_path: Path) -> None:

@@ -22,7 +22,8 @@ def draw_mismatch(data: ReportData) -> Figure | None:
     rows = sorted(rows, key=lambda m: -m["share_of_excess"])[:_SHOWN][::-1]
     figure, (ax,) = panels(9.2, 0.9 + 0.3 * len(rows))
     shares = [100 * row["share_of_excess"] for row in rows]
-    bars = ax.barh([_name(row) for row in rows], shares, color=BLUE, height=0.6)
+    bars = ax.barh(range(len(rows)), shares, color=BLUE, height=0.6)
+    ax.set_yticks(range(len(rows)), [_name(row) for row in rows])
     ax.bar_label(bars, fmt="%.0f %%", padding=3, fontsize=8)
     ax.set(xlabel="share of the misfit beyond noise (%)", xlim=(0, max(shares) * 1.12))
     ax.grid(axis="y", visible=False)
@@ -50,5 +51,6 @@ def draw_holdout(data: ReportData) -> Figure | None:
 
 
 def _name(row: dict[str, Any]) -> str:
-    where = row.get("where")
-    return f"{row['link']}: {row['covariate']}" + (f", {where}" if where else "")
+    parts = [row.get("site"), row["covariate"], row.get("where")]
+    words = ", ".join(str(part) for part in parts if part)
+    return f"{row['link']}: {words.replace('_', ' ')}"

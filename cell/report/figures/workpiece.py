@@ -10,7 +10,7 @@ import numpy as np
 from calib.views import FloatArray
 from cell.report.data import ReportData
 from cell.report.figures.canvas import legend_below, panels, style
-from cell.report.geometry import distance_m, reference, workpiece_error_m
+from cell.report.geometry import best_poses, distance_m, reference, workpiece_error_m
 from cell.report.numbers import solution_name
 
 if TYPE_CHECKING:
@@ -60,6 +60,26 @@ def of_solution(data: ReportData, name: str) -> WorkpieceError | None:
     distance = distance_m(true, board)
     known = np.isfinite(error) & np.isfinite(distance)
     return WorkpieceError(distance[known], error[known], against) if known.any() else None
+
+
+def corrected(data: ReportData) -> WorkpieceError | None:
+    """The error at the work piece when all that the diagnosis found is put right, if measured.
+
+    To first order: the corners move by the camera's remaining shift and turn.
+    """
+    found, poses = data.evidence, best_poses(data)
+    if found is None or poses is None:
+        return None
+    if found.shift_after_m is None or found.turn_after_rad is None:
+        return None
+    board_from_camera = poses.board_from_camera
+    at = data.views.board.corners_m - board_from_camera[:, None, :3, 3]
+    in_camera = at @ board_from_camera[:, :3, :3]
+    moved = found.shift_after_m[:, None] + np.cross(found.turn_after_rad[:, None], in_camera)
+    error = np.sqrt((moved**2).sum(axis=2).mean(axis=1))
+    distance = distance_m(board_from_camera, data.views.board)
+    known = np.isfinite(error) & np.isfinite(distance)
+    return WorkpieceError(distance[known], error[known], "the robot") if known.any() else None
 
 
 def by_distance(found: WorkpieceError, bins: int = 4) -> list[tuple[float, float, int, float]]:

@@ -50,10 +50,10 @@ def _state(data: ReportData, link: str) -> tuple[str, str, str]:
 
 def _detector(data: ReportData) -> str:
     best = data.solutions.get(data.recommended or "", {})
-    noise = (data.diagnosis or {}).get("holdout", {}).get("noise_px")
+    noise = ((data.diagnosis or {}).get("noise") or {}).get("corner_px")
     rms = best.get("reprojection_px", {}).get("rms")
     if noise is not None:
-        return f"noise {noise:.2g} px"
+        return f"noise {noise:.2g} px per axis"
     return "not known" if rms is None else f"RMS {rms:.2g} px"
 
 

@@ -33,13 +33,20 @@ def story(data: ReportData) -> str:
         "diagnosis",
         f"Diagnosis: {verdict.lower()}",
         html.paragraph(f"{meaning[0].upper()}{meaning[1:]}.", "lead"),
-        html.bullets(data.diagnosis.get("notes") or []),
         _where(data),
         *(_effect(data, effect) for effect in data.diagnosis.get("effects") or []),
         _unexplained(data.diagnosis),
         _rivals(data.diagnosis),
         _holdout(data),
+        _notes(data.diagnosis.get("notes") or []),
     )
+
+
+def _notes(notes: list[str]) -> str:
+    if not notes:
+        return ""
+    title = "What was worked out, and what could not be seen"
+    return f"<h3>{title}</h3>{html.bullets(note.replace('_', ' ') for note in notes)}"
 
 
 def _where(data: ReportData) -> str:
@@ -47,9 +54,9 @@ def _where(data: ReportData) -> str:
     if not rows:
         return html.paragraph("No link of the chain shows a misfit beyond noise.")
     table = html.table(
-        ("link", "along", "where", "share of excess", "p"),
+        ("link", "site", "along", "where", "share of excess", "p"),
         [
-            (m["link"], m["covariate"], m.get("where") or "everywhere",
+            (m["link"], m.get("site") or "", m["covariate"], m.get("where") or "everywhere",
              _share(m["share_of_excess"]), probability(m.get("p_value")))
             for m in rows
         ],
@@ -154,7 +161,7 @@ def _separation(row: Mapping[str, Any]) -> str:
 def _holdout(data: ReportData) -> str:
     holdout = (data.diagnosis or {}).get("holdout") or {}
     frames = holdout.get("frames")
-    count = len(frames) if isinstance(frames, list) else frames
+    count = len(frames) if isinstance(frames, list | tuple) else frames
     shown = drawing(
         lambda: proof.draw_holdout(data),
         f"The proof: {count} frames that took no part in any fit, before (plain model) and after "

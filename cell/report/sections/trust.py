@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cell.report.data import ReportData
-from cell.report.figures.workpiece import of_solution
+from cell.report.figures.workpiece import corrected, of_solution
 from cell.report.geometry import workpiece_error_m
 from cell.report.numbers import known, measured, millimetres, number, solution_name
 
@@ -16,7 +16,14 @@ _MANY_TIMES = 3.0
 
 def sentences(data: ReportData) -> list[str]:
     """Sentences a technician can act on; what was not logged is among them."""
-    return [*_scale(data), *_zhang(data), *_truth(data), *_independence(data), *not_logged(data)]
+    return [
+        *_scale(data),
+        *_corrected(data),
+        *_zhang(data),
+        *_truth(data),
+        *_independence(data),
+        *not_logged(data),
+    ]
 
 
 def not_logged(data: ReportData) -> Iterator[str]:
@@ -54,6 +61,15 @@ def _scale(data: ReportData) -> Iterator[str]:
         u0 = measured(best["u0_px"], sigma.get("u0_px"), "px")
         v0 = measured(best.get("v0_px"), sigma.get("v0_px"), "px")
         yield f"The principal point is at {u0}, {v0}."
+
+
+def _corrected(data: ReportData) -> Iterator[str]:
+    found = corrected(data)
+    if found is not None and (data.diagnosis or {}).get("effects"):
+        yield (
+            f"With what the diagnosis found put right, the error at the work piece is "
+            f"{millimetres(found.rms_m)} RMS on these frames."
+        )
 
 
 def _zhang(data: ReportData) -> Iterator[str]:
