@@ -9,7 +9,8 @@ from typing import Any
 from calib.detection import Detection
 from cell.calibrate import calibrate_into, detect_corners
 from cell.cli.progress import run_progress
-from cell.cli.summary import calibration_summary
+from cell.cli.summary import calibration_summary, diagnosis_summary
+from cell.diagnose import diagnose_into
 from cell.factory import real_devices, simulated_devices
 from cell.files.plan_file import read_plan
 from cell.recording import Corners, Recording, read_recording, write_corners
@@ -68,7 +69,7 @@ class Outcome:
 
 
 def evaluate(outcome: Outcome, result: RunResult, *, simulated: bool) -> Outcome:
-    """Calibrate a finished run and write its report; results go into the recording's folder.
+    """Calibrate and diagnose a finished run; the results go into the recording's folder.
 
     Raises
     ------
@@ -80,12 +81,15 @@ def evaluate(outcome: Outcome, result: RunResult, *, simulated: bool) -> Outcome
         corners = corners_of_run(recording, result.detections)
         write_corners(outcome.folder / DETECTIONS, corners, recording.board)
     calibrated, folder = calibrate_into(recording, outcome.folder, simulated=simulated)
-    report = folder / "report.html"
+    diagnosed = diagnose_into(recording, folder, simulated=simulated, calibrated=calibrated)
+    found = [calibration_summary(calibrated.mapping), diagnosis_summary(diagnosed.mapping)]
+    files = ("calibration.json", "diagnosis.json", "twin.yaml", "report.html")
     return replace(
         outcome,
-        text=f"{outcome.text}\n{calibration_summary(calibrated.mapping)}\nreport: {report}",
+        text="\n".join([outcome.text, *found, f"report: {folder / 'report.html'}"]),
         mapping=outcome.mapping
-        | {"calibration": str(folder / "calibration.json"), "report": str(report)},
+        | {Path(name).stem: str(folder / name) for name in files}
+        | {"verdict": diagnosed.mapping["verdict"]},
     )
 
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from calib.chain.effect import Present
 from calib.chain.effects import make_effect
-from calib.chain.kinematics import OutOfReach
 from calib.chain.model import CellModel
 from calib.chain.optics import OPTICS, optics_row
 from calib.views import FloatArray, Views
 from cell.errors import InputError
 from cell.files.cell_file import CellFile, EffectFile, Lens, Simulation
 from cell.files.plan_file import Plan
+from cell.sequencer.guard import Guard
 from sim.arm import Repeatability
 from sim.cell import CameraSpec, SimulatedCell
 from sim.log import tour
@@ -130,9 +130,9 @@ def log_of(plan: Plan, cell: SimulatedCell) -> Views:
     InputError
         A view gives only a pose, and the arm cannot reach it or is unknown.
     """
-    joints = _joints(plan, cell)
-    log = _blank(plan, cell) if np.isnan(joints).any() else _tour(plan, cell, joints)
-    return _with_logged(plan, log)
+    if all(view.base_from_flange is not None for view in plan.file.views):
+        return _with_logged(plan, _blank(plan, cell))
+    return _with_logged(plan, _tour(plan, cell, _joints(plan, cell)))
 
 
 def _tour(plan: Plan, cell: SimulatedCell, joints: FloatArray) -> Views:
@@ -145,31 +145,29 @@ def _tour(plan: Plan, cell: SimulatedCell, joints: FloatArray) -> Views:
 
 
 def _joints(plan: Plan, cell: SimulatedCell) -> FloatArray:
-    """(N, 6) joint angles; all NaN where the arm is unknown and the views are poses."""
-    here = cell.home_rad
-    rows = []
-    for index, view in enumerate(plan.file.views):
-        joints = view.joints()
-        if joints is None and cell.robot_model and view.base_from_flange is not None:
-            try:
-                found = cell.kinematics.inverse(view.base_from_flange.transform().as_matrix(), here)
-            except OutOfReach as far:
-                raise InputError(f"{plan.where(index)}: is unreachable: {far}") from None
-            joints = tuple(found.tolist())
-        rows.append(np.full(6, np.nan) if joints is None else np.array(joints, dtype=float))
-        here = rows[-1]
+    """(N, 6) joint angles of the views, poses solved by the branch nearest to the one before."""
+    guard = Guard.of(plan)
+    here, rows = cell.home_rad, []
+    for index in range(len(plan.file.views)):
+        here = guard.joints_of(plan, index, here)
+        rows.append(here)
     return np.array(rows)
 
 
 def _blank(plan: Plan, cell: SimulatedCell) -> Views:
+    joints = [view.joints() for view in plan.file.views]
     blank = Views.blank(
         cell.board,
         width_px=cell.camera.width_px,
         height_px=cell.camera.height_px,
-        frames=len(plan.file.views),
+        frames=len(joints),
         mount=cell.mount,
+        joints=max((len(given) for given in joints if given is not None), default=6),
     )
-    return replace(blank, payload_kg=cell.payload_kg)
+    for row, given in zip(blank.joints_rad, joints, strict=True):
+        if given is not None:
+            row[:] = given
+    return replace(blank, payload_kg=cell.payload_kg, robot_model=cell.robot_model or None)
 
 
 _LOGGED = (

@@ -9,6 +9,8 @@ from collections.abc import Callable
 import typer
 
 from cell.cli.calibrate import calibrate
+from cell.cli.diagnose import diagnose
+from cell.cli.export import export
 from cell.cli.importing import import_
 from cell.cli.plan import plan
 from cell.cli.run import run
@@ -26,6 +28,8 @@ VERBS: dict[str, Callable[..., None]] = {
     "plan": plan,
     "simulate": simulate,
     "calibrate": calibrate,
+    "diagnose": diagnose,
+    "export": export,
     "import": import_,
 }
 for name, verb in VERBS.items():

@@ -24,8 +24,9 @@ def calibrate(
     from cell.recording import read_recording
 
     source = read_recording(recording)
-    simulated = bool((source.header.model_extra or {}).get("simulated"))
     with picture_progress() as progress:
-        calibrated, folder = calibrate_into(source, output, progress=progress, simulated=simulated)
+        calibrated, folder = calibrate_into(
+            source, output, progress=progress, simulated=source.header.simulated
+        )
     text = f"{calibration_summary(calibrated.mapping)}\nreport: {folder / 'report.html'}"
     show(text, calibrated.mapping, as_json=as_json)

@@ -8,6 +8,7 @@ from typing import Any
 _NAMES = {
     "zhang_algebraic": "Zhang, algebraic",
     "zhang_mle": "Zhang, maximum likelihood",
+    "zhang_mle_no_skew": "Zhang, maximum likelihood, no skew",
     "fixed_alpha_algebraic": "fixed scale factors, algebraic",
     "fixed_alpha_mle": "fixed scale factors, maximum likelihood",
     "joint_ml": "joint with the robot",
@@ -24,6 +25,19 @@ def calibration_summary(calibration: Mapping[str, Any]) -> str:
         lines.append(f"focus law {law['law']}: {values}")
     lines.append(f"{'solution':42}{'alpha px':>10}{'rms px':>9}{'camera off by mm':>18}")
     lines += [_solution(name, found) for name, found in calibration["solutions"].items()]
+    return "\n".join(lines)
+
+
+def diagnosis_summary(diagnosis: Mapping[str, Any]) -> str:
+    """What `diagnosis.json` says, for people."""
+    lines = [f"verdict: {diagnosis['verdict']}"]
+    holdout = diagnosis.get("holdout")
+    if holdout:
+        before, after, noise = (holdout[k] for k in ("rms_px_before", "rms_px_after", "noise_px"))
+        lines.append(
+            f"frames held out: {before:.3f} px before, {after:.3f} px after; noise {noise:.3f} px"
+        )
+    lines += [f"- {effect['name']}: {effect['physics']}" for effect in diagnosis["effects"]]
     return "\n".join(lines)
 
 

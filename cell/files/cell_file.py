@@ -37,7 +37,7 @@ BoardFile = Annotated[CellChessboard | CellCharuco, Field(discriminator="type")]
 class SimulatedRobot(Part):
     """An arm in this process."""
 
-    driver: Literal["sim"] = "sim"
+    driver: Literal["sim"]
     model: str | None
     """Kinematic model: ur3, ur3e, ur5, ur5e, ur10, ur10e, ur16e, irb140; null where it is unknown,
     for a cell that is simulated at logged poses and never moved."""
@@ -81,7 +81,7 @@ class Lens(Part):
 class SimulatedCamera(Part):
     """A camera in this process, and what all cameras have in common."""
 
-    driver: Literal["sim"] = "sim"
+    driver: Literal["sim"]
     model: str | None = None
     width: PositiveInt
     height: PositiveInt

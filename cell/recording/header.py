@@ -118,6 +118,8 @@ class Header(_Part):
     capture: Annotated[Capture, BeforeValidator(_or_empty)] = Capture()
     images: str | None = None
     """Folder of the pictures, or null when only corners were kept."""
+    simulated: bool = False
+    """Whether arm and camera were simulated."""
 
     def as_mapping(self) -> dict[str, Any]:
         """Plain dicts and lists, keys as in the file."""

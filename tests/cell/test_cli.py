@@ -1,0 +1,220 @@
+"""Every verb from outside: arguments, exit status, what is said where."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from cell.cli.app import main
+from cell.recording import read_recording
+from tests.cell.plans import CELL, PLAN
+from tests.cell.recordings import HEADER, corner_rows, frame_line
+
+ROOT = Path(__file__).parents[2]
+SIMULATION = """\
+simulation:
+  mounted: {p_m: [0.0, 0.0, 0.05], rpy_deg: [0, 0, 0]}
+  fixed: {p_m: [-0.55, -0.2, 0.0], rpy_deg: [180, 0, 0]}
+  optics: {alpha_px: 500, beta_px: 500, u0_px: 320, v0_px: 240}
+  noise: {corner_px: 0.1, read_levels: 0.0, full_well_electrons: null}
+"""
+
+
+class Said:
+    def __init__(self, status: int, out: str, err: str) -> None:
+        self.status, self.out, self.err = status, out, err
+
+
+Cell = Callable[..., Said]
+
+
+@pytest.fixture
+def cell(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Cell:
+    def call(*words: str | Path) -> Said:
+        monkeypatch.setattr(sys, "argv", ["cell", *map(str, words)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        said = capsys.readouterr()
+        return Said(int(left.value.code or 0), said.out, said.err)
+
+    return call
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    (tmp_path / "bench.yaml").write_text(CELL + SIMULATION)
+    (tmp_path / "plan.yaml").write_text(PLAN + "checks: {board: false}\n")
+    return tmp_path / "plan.yaml"
+
+
+def test_a_dry_run_records_and_can_be_told_as_json(cell: Cell, plan: Path, tmp_path: Path) -> None:
+    said = cell("run", plan, "--dry-run", "--record-only", "-o", tmp_path / "r", "--json")
+    assert said.status == 0, said.err
+    result = json.loads(said.out)
+    assert (result["finish"], result["frames"]) == ("completed", 4)
+    recording = read_recording(tmp_path / "r")
+    assert recording.header.simulated
+    assert recording.image(recording.frames[0]).shape == (480, 640)
+    assert "SIMULATED" in said.err
+    assert said.err.count("logged") == 4
+
+
+def test_resume_has_nothing_left_to_do(cell: Cell, plan: Path, tmp_path: Path) -> None:
+    words = ("run", plan, "--dry-run", "--record-only", "-o", tmp_path / "r")
+    assert cell(*words).status == 0
+    assert "never overwritten" in cell(*words).err
+    assert cell(*words, "--resume").status == 0
+    plan.write_text(plan.read_text().replace("0.2", "0.1"))
+    said = cell(*words, "--resume")
+    assert said.status == 2
+    assert "another plan or cell" in said.err
+
+
+def test_a_plan_is_designed_and_simulated(cell: Cell, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "configs" / "ur3-robotiq.cell.yaml", tmp_path)
+    words = ("--parallel", "4", "--varied", "6")
+    said = cell("plan", tmp_path / "ur3-robotiq.cell.yaml", *words)
+    assert said.status == 0, said.err
+    made = tmp_path / "ur3-robotiq.plan.yaml"
+    assert cell("plan", tmp_path / "ur3-robotiq.cell.yaml").status == 2
+    said = cell("simulate", made, "-o", tmp_path / "r", "--json", "--seed", "5")
+    assert said.status == 0, said.err
+    assert json.loads(said.out)["effects"] == ["focus_breathing"]
+    views = read_recording(tmp_path / "r").views()
+    assert len(views) >= 9
+    assert views.seen.all()
+    assert views.has_pose.all()
+
+
+def test_effects_on_the_command_line_take_the_place_of_the_cells_own(
+    cell: Cell, tmp_path: Path
+) -> None:
+    plan = ROOT / "configs" / "ur3-robotiq.plan.yaml"
+    quiet = "board_scale:relative=0"
+    pulled = "joint_zero_offset:offset_rad_2=0.01"
+    for name, effect in (("quiet", quiet), ("pulled", pulled)):
+        said = cell("simulate", plan, "-o", tmp_path / name, "--effect", effect)
+        assert said.status == 0, said.err
+    quiet_px, pulled_px = (
+        read_recording(tmp_path / name).views().corners_px for name in ("quiet", "pulled")
+    )
+    assert np.nanmedian(np.abs(pulled_px - quiet_px)) > 1.0
+
+
+@pytest.mark.parametrize(
+    ("effect", "message"),
+    [
+        ("gremlins", "no effect is called 'gremlins'"),
+        ("focus_breathing:law=inverse_square,k=3", "has no parameter 'k'"),
+        ("focus_breathing:law=inverse_square,k_px_m2=x", "is no number"),
+        ("focus_breathing:law", "is no key=value"),
+    ],
+)
+def test_an_effect_that_is_not_understood(
+    cell: Cell, tmp_path: Path, effect: str, message: str
+) -> None:
+    plan = ROOT / "configs" / "ur3-robotiq.plan.yaml"
+    said = cell("simulate", plan, "-o", tmp_path / "r", "--effect", effect)
+    assert said.status == 2
+    assert message in said.err
+
+
+def test_a_twin_is_simulated_at_its_logged_poses(cell: Cell, tmp_path: Path) -> None:
+    (tmp_path / "twin.yaml").write_text(
+        "schema: cell.plan/1\nname: twin\ncell:\n  "
+        + "\n  ".join((CELL + SIMULATION).replace("model: ur5e", "model: null").splitlines())
+        + "\nviews:\n"
+        + "- {frame: 7, t_s: 3.5, temperature_c: 30, joints_rad: [0, -1.5, 1.5, -1.5, -1.5, 0],"
+        " base_from_flange: {p_m: [-0.5, -0.15, 0.45], q_xyzw: [1, 0, 0, 0]}}\n"
+    )
+    said = cell("simulate", tmp_path / "twin.yaml", "-o", tmp_path / "r")
+    assert said.status == 0, said.err
+    frame = read_recording(tmp_path / "r").frames[0]
+    assert (frame.frame, frame.t_s, frame.temperature_c) == (7, 3.5, 30)
+    assert frame.base_from_flange is not None
+    assert frame.base_from_flange.p_m == (-0.5, -0.15, 0.45)
+
+
+def test_unusable_arguments(cell: Cell, plan: Path, tmp_path: Path) -> None:
+    assert cell("run").status == 2
+    assert cell("run", plan, "--dry-run", "--resume").status == 2
+    assert cell("run", plan, "--frobnicate").status == 2
+    assert cell("calibrate", tmp_path / "nowhere").status == 2
+    said = cell("run", plan)
+    assert said.status == 2
+    assert "its arm is simulated" in said.err
+
+
+# -- bad input: each with its status, and an error that says what, where and how to mend it -----
+
+
+def test_missing_and_broken_yaml(cell: Cell, plan: Path, tmp_path: Path) -> None:
+    said = cell("run", tmp_path / "nowhere.yaml", "--dry-run")
+    assert (said.status, said.out) == (2, "")
+    assert "nowhere.yaml: cannot be read" in said.err
+    plan.write_text("schema: cell.plan/1\nviews: [")
+    said = cell("run", plan, "--dry-run")
+    assert said.status == 2
+    assert "plan.yaml:2:" in said.err
+    assert "is not valid YAML" in said.err
+    assert "Traceback" not in said.err
+
+
+def test_an_unreachable_pose(cell: Cell, plan: Path, tmp_path: Path) -> None:
+    far = "- {name: far, base_from_flange: {p_m: [3, 0, 0.5], q_xyzw: [0, 1, 0, 0]}}\n"
+    plan.write_text(PLAN + far)
+    said = cell("run", plan, "--dry-run", "-o", tmp_path / "r")
+    assert said.status == 2
+    assert "views.4 (far): is unreachable" in said.err
+
+
+def test_a_plan_that_is_too_fast(cell: Cell, plan: Path, tmp_path: Path) -> None:
+    plan.write_text(PLAN.replace("0.2", "0.5"))
+    said = cell("run", plan, "--dry-run", "-o", tmp_path / "r")
+    assert said.status == 5
+    assert "plan.yaml:4:1: speed_m_s: 0.5 m/s is faster than 0.25 m/s" in said.err
+    assert not (tmp_path / "r").exists()
+
+
+def test_a_board_found_nowhere(cell: Cell, tmp_path: Path) -> None:
+    for number in range(3):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((120, 160), 128, np.uint8))
+    said = cell("import", tmp_path, "--board", "4x5x0.03", "-o", tmp_path / "r")
+    assert said.status == 1
+    assert "the board was found in none of 3 pictures" in said.err
+    said = cell("calibrate", tmp_path / "r")
+    assert said.status == 1
+    assert "Traceback" not in said.err
+
+
+def test_two_frames_only(cell: Cell, recording_folder: Callable[..., Path]) -> None:
+    rows = "frame,row,col,u_px,v_px\n" + corner_rows(0) + corner_rows(1)
+    folder = recording_folder(frames=frame_line(0) + frame_line(1), detections=rows)
+    said = cell("calibrate", folder)
+    assert said.status == 1
+    assert "Traceback" not in said.err
+    assert "2" in said.err
+
+
+def test_a_recording_from_a_newer_schema(cell: Cell, recording_folder: Callable[..., Path]) -> None:
+    said = cell("calibrate", recording_folder(header=HEADER.replace("/1", "/9")))
+    assert said.status == 2
+    assert "newer version" in said.err
+    assert "recording.yaml:1:1" in said.err
+
+
+def test_an_image_that_is_not_an_image(cell: Cell, recording_folder: Callable[..., Path]) -> None:
+    header = HEADER.replace("images: null", "images: images/")
+    folder = recording_folder(header=header, frames=frame_line(0, image="a.png"))
+    (folder / "detections.csv").unlink()
+    (folder / "a.png").write_text("this is no picture")
+    said = cell("calibrate", folder)
+    assert said.status == 1
+    assert "a.png: is not an image" in said.err
