@@ -9,7 +9,7 @@ so that a scatter larger than the corners' own (the robot's) does not pass for p
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,10 @@ from calib.views import FloatArray
 
 DECISIVE_AICC = 6.0
 """AICc gain from which a law is taken over a simpler one: odds of 20 to 1."""
+
+
+POOR_SCATTER = 3.0
+"""Residuals over sigma from which no law on offer describes the lens, or the sigmas are wrong."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ class FocusLaw:
     def scale_px(self, distance_m: FloatArray | float) -> FloatArray:
         """Scale factor at the given distances, pixels."""
         values = np.array([p.value for p in self.parameters.values()])
-        return _SHAPES[self.law].value(values, np.asarray(distance_m, dtype=float))
+        return law_scale_px(self.law, values, distance_m)
 
     def sigma_px(self, distance_m: FloatArray | float) -> FloatArray:
         """One sigma of `scale_px`, pixels."""
@@ -127,6 +131,15 @@ _SHAPES: dict[str, _Shape] = {
         _thin_jacobian,
     ),
 }
+
+
+LAWS: dict[str, tuple[str, ...]] = {law: shape.names for law, shape in _SHAPES.items()}
+"""Names of every law's parameters, the scale factor far away first."""
+
+
+def law_scale_px(law: str, values: FloatArray, distance_m: FloatArray | float) -> FloatArray:
+    """Scale factor by one of `LAWS` with these parameter values, at these distances; pixels."""
+    return _SHAPES[law].value(values, np.asarray(distance_m, dtype=float))
 
 
 def fit_focus_law(
@@ -235,7 +248,11 @@ def choose_focus_law(
             continue
     if "constant" not in fitted:
         return None
-    return _prefer(tuple(fitted.values()))
+    choice = _prefer(tuple(fitted.values()))
+    if choice.preferred.scatter <= POOR_SCATTER:
+        return choice
+    poor = f"; yet the points scatter by {choice.preferred.scatter:.1f} sigma about it: none fits"
+    return replace(choice, decisive=False, why=choice.why + poor)
 
 
 def _prefer(candidates: tuple[FocusLaw, ...]) -> FocusLawChoice:

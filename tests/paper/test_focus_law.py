@@ -45,6 +45,14 @@ def test_a_constant_is_kept_and_rarely_mistaken() -> None:
     assert kept >= 97
 
 
+def test_a_lens_that_obeys_no_law_on_offer_is_told() -> None:
+    scale, sigma = _noisy(4755.8 - 60 * np.exp(-(((DISTANCE - 0.8) / 0.15) ** 2)))
+    choice = choose_focus_law(DISTANCE, scale, sigma)
+    assert choice is not None
+    assert not choice.decisive
+    assert "none fits" in choice.why
+
+
 def test_too_few_views_give_no_law() -> None:
     assert choose_focus_law(DISTANCE[:4], np.ones(4), np.ones(4)) is None
     with pytest.raises(CalibrationError, match="distances"):
