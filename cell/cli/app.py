@@ -10,6 +10,7 @@ import typer
 
 from cell.cli.calibrate import calibrate
 from cell.cli.diagnose import diagnose
+from cell.cli.doctor import doctor
 from cell.cli.export import export
 from cell.cli.importing import import_
 from cell.cli.plan import plan
@@ -31,6 +32,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "diagnose": diagnose,
     "export": export,
     "import": import_,
+    "doctor": doctor,
 }
 for name, verb in VERBS.items():
     app.command(name)(verb)
