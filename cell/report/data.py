@@ -87,8 +87,12 @@ class Evidence:
     turn_before_rad, turn_after_rad:
         (N, 3) error of the camera's orientation as rotation vectors, radians.
     shift_without_m, turn_without_rad:
-        The same errors by effect name, under the final model with that one effect left out; they
-        show an effect apart from the others, and take the place of before where they are given.
+        The same errors by effect name, under the final model with that one effect left out and
+        everything else as found; they show an effect bare, and take the place of before where
+        they are given.
+    cost_m:
+        By effect name the RMS camera shift that leaving it out costs, when hand-eye and board
+        poses are solved again, metres.
     alpha_px, alpha_sigma_px:
         (N,) scale factor of each view when the robot's depth is believed, and its one-sigma.
     board_offset_m:
@@ -106,6 +110,7 @@ class Evidence:
     turn_after_rad: FloatArray | None = None
     shift_without_m: Mapping[str, FloatArray] = field(default_factory=dict)
     turn_without_rad: Mapping[str, FloatArray] = field(default_factory=dict)
+    cost_m: Mapping[str, float] = field(default_factory=dict)
     alpha_px: FloatArray | None = None
     alpha_sigma_px: FloatArray | None = None
     board_offset_m: FloatArray | None = None

@@ -38,7 +38,7 @@ def diagnosis_evidence(
     """
     plain, final = pose_errors(before, views), pose_errors(twin, mended)
     alpha, alpha_sigma = scale_at_robot_depth(plain, views, corner_px, flange_m)
-    alone = {name: _aligned(e, mended, views) for name, e in _left_out(twin, mended).items()}
+    alone = _left_out(twin, mended)
     return Evidence(
         before_px=plain.residual_px,
         after_px=_aligned(final.residual_px, mended, views),
@@ -46,8 +46,9 @@ def diagnosis_evidence(
         shift_after_m=_aligned(final.shift_m, mended, views),
         turn_before_rad=plain.turn_rad,
         turn_after_rad=_aligned(final.turn_rad, mended, views),
-        shift_without_m={name: error[:, :3] for name, error in alone.items()},
-        turn_without_rad={name: error[:, 3:] for name, error in alone.items()},
+        shift_without_m={n: _aligned(e.shift_m, mended, views) for n, e in alone.items()},
+        turn_without_rad={n: _aligned(e.turn_rad, mended, views) for n, e in alone.items()},
+        cost_m={name: _cost_m(errors) for name, errors in alone.items()},
         alpha_px=alpha,
         alpha_sigma_px=alpha_sigma,
         board_offset_m=_offset(final, views),
@@ -57,16 +58,20 @@ def diagnosis_evidence(
     )
 
 
-def _left_out(twin: CellModel, mended: Views) -> dict[str, FloatArray]:
-    """Per effect (N, 6) errors of the twin without it; with one effect alone, before says that."""
-    if len(twin.effects) < 2:
-        return {}
+def _left_out(twin: CellModel, mended: Views) -> dict[str, PoseErrors]:
+    """Per effect the errors of the twin without it, everything else as found."""
     return {
-        left.effect.name: without_constant_part(
-            pose_errors(twin.with_effects(e for e in twin.effects if e is not left), mended)
+        left.effect.name: pose_errors(
+            twin.with_effects(e for e in twin.effects if e is not left), mended
         )
         for left in twin.effects
     }
+
+
+def _cost_m(found: PoseErrors) -> float:
+    """RMS camera shift that is left when hand-eye and board poses are solved again, metres."""
+    shift = without_constant_part(found)[:, :3]
+    return float(np.sqrt(np.nanmean((shift**2).sum(axis=1))))
 
 
 def _offset(final: PoseErrors, views: Views) -> FloatArray | None:

@@ -239,6 +239,7 @@ def evidence(made: MadeUp) -> Evidence:
         shift_before_m=before,
         shift_after_m=shift,
         shift_without_m={"joint_compliance": shift + 4e-4 * np.sin(joint)[:, None] * [1, 0, 0]},
+        cost_m={"joint_compliance": 3.2e-4},
         turn_before_rad=made.rng.normal(0, 3e-4, (count, 3)),
         turn_after_rad=made.rng.normal(0, 1e-4, (count, 3)),
         alpha_px=ALPHA_PX - K_PX_M2 / made.distance_m**2 + made.rng.normal(0, 0.6, count),

@@ -96,6 +96,7 @@ def test_every_reference_inside_the_page_has_its_target(tmp_path: Path) -> None:
         "0.118 px",  # held-out after
         "noise floor 0.104 px",
         "joint 3 = (2.10 ± 0.20)·10⁻⁵ rad/Nm",
+        "the camera 0.32 mm RMS off",
         "cell run separate.yaml",
         "12.300 ± 0.011 mm",  # flange_from_camera x
         "blurred: edge blur 3.1 px <limit>",

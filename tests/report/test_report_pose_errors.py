@@ -84,5 +84,7 @@ def test_frames_the_diagnosis_left_out_are_missing_after_and_there_before() -> N
     assert np.isnan(found.shift_after_m[:2]).all()
     assert np.nanmax(np.abs(found.shift_after_m)) < 1e-6
     assert set(found.shift_without_m) == {"focus_breathing", "board_warp"}
+    bare = found.shift_without_m["focus_breathing"]
+    assert 1e-3 < found.cost_m["focus_breathing"] < np.sqrt(np.nanmean((bare**2).sum(axis=1)))
     assert found.board_offset_m is not None
     assert np.ptp(found.board_offset_m[:, 2]) == pytest.approx(4e-4, rel=0.02)

@@ -107,7 +107,8 @@ register(
     "mount_flex lens_sag mount",
     Picture(
         mount.error_against_gravity,
-        "The camera's error follows the direction in which it feels gravity before, not after.",
+        "The camera's error follows the direction in which it feels gravity without the effect, "
+        "and not with it.",
         "the hand-eye pose, the flange poses and the camera pose error of each frame",
     ),
 )

@@ -113,13 +113,16 @@ def _cost(data: ReportData, effect: Mapping[str, Any]) -> str:
     found = data.evidence
     if found is None or found.shift_before_m is None:
         return "in mm not known: no per-frame pose errors were measured"
-    alone = found.shift_without_m.get(effect["name"])
-    before = _rms(found.shift_before_m if alone is None else alone)
-    words = "what was found" if alone is None else "it alone"
-    without = f"the camera is {millimetres(before)} RMS off without {words}"
+    alone = found.cost_m.get(effect["name"])
+    if alone is None:
+        without = f"the camera is {millimetres(_rms(found.shift_before_m))} RMS off without it"
+    else:
+        without = (
+            f"left out alone, and hand-eye solved again: the camera {millimetres(alone)} RMS off"
+        )
     if found.shift_after_m is None:
         return without
-    return f"{without}, {millimetres(_rms(found.shift_after_m))} with all that was found"
+    return f"{without}; {millimetres(_rms(found.shift_after_m))} with all that was found"
 
 
 def _unexplained(diagnosis: Mapping[str, Any]) -> str:
