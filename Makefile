@@ -19,6 +19,7 @@ run: $(STAMP)
 	$(BIN)/cell run --dry-run
 
 test: $(STAMP) lint types layers
+	tools/install-mrcal
 	$(BIN)/python -m pytest -n 2
 
 lint: $(STAMP)

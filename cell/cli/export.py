@@ -1,0 +1,59 @@
+"""`cell export`: the calibrated camera in another program's own format."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cell.cli.output import JsonFlag, say, show
+from cell.errors import InputError
+
+
+def export(
+    calibration: Annotated[Path, typer.Argument(help="A calibration.json, or its folder.")],
+    tool: Annotated[
+        str, typer.Option("--format", help="ros, opencv, mrcal, kalibr, colmap or json.")
+    ],
+    distance: Annotated[
+        float | None,
+        typer.Option("--distance", help="Metres; needed where the focal length depends on it."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File to write; stdout without.")
+    ] = None,
+    solution: Annotated[
+        str | None, typer.Option("--solution", help="Which solution; the best one without.")
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Write the calibrated camera for ROS, OpenCV, mrcal, Kalibr, COLMAP or as JSON."""
+    from cell.export import export_calibration, read_calibration
+    from cell.export.place import calibration_file
+
+    path = calibration_file(calibration)
+    try:
+        exported = export_calibration(
+            read_calibration(path), tool, distance_m=distance, solution=solution
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    for warning in exported.warnings:
+        say(f"warning: {warning}")
+    if output is not None:
+        _write(output, exported.text)
+    if output is None and not as_json:
+        sys.stdout.write(exported.text)
+        return
+    written = None if output is None else str(output)
+    result = {"format": tool, "file": written, "text": exported.text, "warnings": exported.warnings}
+    show(f"{tool}: {output}", result, as_json=as_json)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be written: {fault.strerror}") from None

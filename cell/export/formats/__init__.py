@@ -1,0 +1,1 @@
+"""One file per program that a camera can be handed to."""
