@@ -57,7 +57,10 @@ def _named(device: str, glib: Any) -> Iterator[None]:
             message = f"{device}: {error.message}; check its power, cable and address"
             raise DeviceUnreachable(message) from None
         if of_device and error.code == _ACCESS_DENIED_CODE:
-            raise DeviceRefused(f"{device}: {error.message}: {_OTHER_PROGRAM}") from None
+            raise DeviceUnreachable(
+                f"{device}: it no longer takes our orders: it was switched off and on, or another "
+                "program took control; connect again"
+            ) from None
         raise DeviceRefused(f"{device}: {error.message}") from None
 
 

@@ -179,6 +179,18 @@ def test_a_killed_camera_is_noticed_and_reopened_with_its_settings(
     assert frames_right(camera, scene, 3) == [True] * 3
 
 
+def test_a_camera_switched_off_and_on_is_not_taken_for_a_foreign_one(
+    camera: AravisCamera, peer: GigEPeer, scene: Scene
+) -> None:
+    camera.grab(5.0)
+    peer.kill()
+    peer.start()
+    with pytest.raises(DeviceUnreachable, match="switched off and on"):
+        camera.grab(5.0)
+    camera.connect()
+    assert frames_right(camera, scene, 2) == [True, True]
+
+
 def test_a_camera_lost_while_idle_is_noticed(camera: AravisCamera, peer: GigEPeer) -> None:
     camera.grab(5.0)
     peer.kill()
