@@ -57,7 +57,7 @@ class Stopper:
         except requests.RequestException as error:
             raise DeviceUnreachable(f"ABB arm {self._url}: {error}") from None
         self._guard = subprocess.Popen(
-            [sys.executable, str(_GUARD)],
+            [sys.executable, "-P", str(_GUARD)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -187,27 +187,34 @@ class Supervisor:
 
     def _judge(self) -> None:
         with self._lock:
-            self._see_stop_through()
-            order, reading = self._order, self.newest
-            if order is None or order.started_s is None or reading is None or not self._still:
-                return
-            off = missed(order.target, reading)
-            if off is not None and time.monotonic() - order.started_s < _START_S:
-                return
-            self._order = None
+            stop_again = self._stop_pending()
+            off = self._end_order()
+        if stop_again:
+            self._stopper.order()
         if off is not None:
             self._trip(self._reason(off))
 
-    def _see_stop_through(self) -> None:
-        if self._stop_s is None:
-            return
-        assert self.newest is not None
+    def _end_order(self) -> str | None:
+        """Forget an order that came to its end; return how far off the arm then is, if it is."""
+        order, reading = self._order, self.newest
+        if order is None or order.started_s is None or reading is None or not self._still:
+            return None
+        off = missed(order.target, reading)
+        if off is not None and time.monotonic() - order.started_s < _START_S:
+            return None
+        self._order = None
+        return off
+
+    def _stop_pending(self) -> bool:
+        """Whether a stop is still to be confirmed."""
+        if self._stop_s is None or self.newest is None:
+            return False
         if self._still and self.newest.host_t_s > self._stop_s:
             self._stop_s = self.stop_failed = None
-            return
-        self._stopper.order()
+            return False
         if time.monotonic() - self._stop_s > _STOP_CONFIRM_S:
             self.stop_failed = f"it still moves {_STOP_CONFIRM_S:g} s after it was told to stop"
+        return True
 
     def _reason(self, off: str) -> str:
         with named(self._url):

@@ -23,12 +23,13 @@ from drivers.ur.pose import base_from_flange, base_from_tcp, pose_of
 from drivers.ur.reader import Packet, RtdeReader
 from drivers.ur.settings import URSettings
 from drivers.ur.speed import leading_joint_speed_rad_s, tcp_speed_m_s
-from drivers.ur.status import fault_in
+from drivers.ur.status import Runtime, fault_in
 from drivers.ur.supervisor import Supervisor, at_rest
 
 _log = logging.getLogger("cell.drivers")
 _JOINT_LIMIT_RAD = 6.3
 _UNLOCK_CONFIRM_S = 2.0
+_PROGRAM_END_S = 1.0
 
 
 class URArm:
@@ -62,7 +63,7 @@ class URArm:
         DeviceUnreachable
             No answer from one of the controller's ports.
         DeviceRefused
-            Local mode, registers held by another client, PolyScope too old.
+            Local mode, a program running, registers held by another client, PolyScope too old.
         ArmStopped
             Powered off, or stopped for safety.
         """
@@ -178,6 +179,7 @@ class URArm:
         fault = fault_in(self._reader.newest())
         if fault is not None:
             raise ArmStopped(self._named(fault))
+        self._await_no_program()
         self.kinematics = read_kinematics(self._host)
         if self.kinematics is None:
             _log.warning(
@@ -211,6 +213,16 @@ class URArm:
             return DeviceRefused(self._named(f"{why}: pip install 'calibration-cell[ur]'"))
         return DeviceUnreachable(self._named(f"cannot start the control script: {why}"))
 
+    def _await_no_program(self) -> None:
+        # ur-rtde would end a program that is not ours without asking
+        deadline = time.monotonic() + _PROGRAM_END_S
+        while self._reader.newest().number("runtime_state") != Runtime.STOPPED:
+            if time.monotonic() > deadline:
+                raise DeviceRefused(
+                    self._named("a program is running on the robot, or paused: stop it first")
+                )
+            time.sleep(0.02)
+
     def _await_no_fault(self) -> None:
         deadline = time.monotonic() + _UNLOCK_CONFIRM_S
         while (fault := fault_in(self._reader.newest())) is not None:
@@ -233,9 +245,9 @@ class URArm:
         return MoveOrder("move_l", goal, speed, settings.tcp_acceleration_m_s2)
 
     def _raw(self, packet: Packet) -> dict[str, Any]:
-        raw: dict[str, Any] = dict(packet.values)
+        raw: dict[str, Any] = {**packet.values, **self.identity}
         if self.kinematics is not None:
-            raw["kinematics_checksum"] = self.kinematics.checksum
+            raw["kinematics"] = vars(self.kinematics)
         return raw
 
     def _connected(self) -> Supervisor:

@@ -64,7 +64,7 @@ class MotionChild:
     def __init__(self, options: ChildOptions) -> None:
         arguments = json.dumps({**vars(options), "parent_pid": os.getpid()})
         self._process = subprocess.Popen(
-            [sys.executable, str(_CHILD), arguments],
+            [sys.executable, "-P", str(_CHILD), arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

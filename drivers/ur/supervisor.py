@@ -31,7 +31,7 @@ AT_REST_RAD_S = 0.01
 _CYCLE_S = 0.01
 _BEAT_S = 0.2
 _RESEND_S = 0.05
-_STOP_CONFIRM_S = 1.0
+_STOP_CONFIRM_S, _REPEAT_S = 1.0, 3.0
 _ACCEPT_S = 1.0
 _PROGRAM_GRACE_S = 0.1
 _ARRIVED_RAD, _ARRIVED_M = 0.01, 0.002
@@ -151,6 +151,7 @@ class Supervisor:
             except DeviceUnreachable as error:
                 self._trip(str(error))
                 self._bury()
+                self._repeat_stop()
             except Exception as error:
                 # nobody would watch the arm any more: whatever it is, stop first
                 self._trip(f"the driver's supervision failed: {error!r}")
@@ -181,7 +182,13 @@ class Supervisor:
             self.stop_failed = (
                 f"the arm still moves {_STOP_CONFIRM_S:g} s after it was told to stop"
             )
-        if self._stop_s is not None and now - self._resent_s > _RESEND_S:
+        self._repeat_stop()
+
+    def _repeat_stop(self) -> None:
+        """Send a stop that is not confirmed again, but not for ever: others may use the arm."""
+        now = time.monotonic()
+        pending = self._stop_s is not None and now - self._stop_s < _REPEAT_S
+        if pending and now - self._resent_s > _RESEND_S:
             self._stops.order()
             self._resent_s = now
 

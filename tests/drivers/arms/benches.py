@@ -16,6 +16,7 @@ from scipy.spatial.transform import RigidTransform
 from calib.chain.kinematics import arm as kinematics_of
 from drivers.abb import ABBArm, ABBSettings
 from drivers.arm import Arm, ArmState, Motion, MoveTarget
+from drivers.errors import DeviceUnreachable, StopFailed
 from drivers.ur import URArm, URSettings
 from sim.arm import SimArm
 from sim.clock import WallClock
@@ -49,7 +50,7 @@ class Bench:
         return RigidTransform.from_matrix(kinematics_of(self.model).forward(self.true_joints()))
 
     def truly_moving(self) -> bool:
-        return bool(np.abs(self.sim.truth().joint_velocity_rad_s).max() > 0.0)
+        return truly_moving(self.sim)
 
 
 def own_address() -> str:
@@ -166,3 +167,32 @@ def slowly(joints_rad: tuple[float, ...]) -> MoveTarget:
 
 def quickly(joints_rad: tuple[float, ...]) -> MoveTarget:
     return MoveTarget(joints_rad=joints_rad, joint_speed_rad_s=1.0, tcp_speed_m_s=0.9)
+
+
+def truly_moving(sim: SimArm) -> bool:
+    return bool(np.abs(sim.truth().joint_velocity_rad_s).max() > 0.0)
+
+
+def halted_s(controller: URController | ABBController, since_s: float) -> float:
+    """Time from `since_s` to the halt of the arm, as the controller noted it."""
+
+    def halts() -> list[float]:
+        halts = (event.t_s for event in controller.events if event.what.startswith("halt"))
+        return [t_s for t_s in halts if t_s >= since_s]
+
+    assert until(lambda: bool(halts()), 3.0), controller.events
+    return halts()[0] - since_s
+
+
+def stays(sim: SimArm, duration_s: float = 0.3) -> bool:
+    before = sim.truth().joints_rad
+    time.sleep(duration_s)
+    return bool(np.abs(sim.truth().joints_rad - before).max() < 1e-9)
+
+
+def unreachable(arm: Arm) -> bool:
+    try:
+        arm.state()
+    except (DeviceUnreachable, StopFailed):
+        return True
+    return False

