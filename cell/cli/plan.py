@@ -20,6 +20,9 @@ def plan(
     parallel: Annotated[int, typer.Option(min=0, help="Fronto-parallel views.")] = 16,
     varied: Annotated[int, typer.Option(min=0, help="Tilted views.")] = 24,
     seed: Annotated[int, typer.Option(min=0, help="Of the spread of the tilted views.")] = 1,
+    by_hand: Annotated[
+        bool, typer.Option("--by-hand", help="Near views tilted, far ones flat: the paper's plan.")
+    ] = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Design a plan whose poses the arm can reach, with the board whole in the picture."""
@@ -31,8 +34,9 @@ def plan(
     if path.exists():
         raise InputError(f"{path}: is there already and is not overwritten; give another -o")
     beside = os.path.relpath(cell.resolve(), path.resolve().parent)
-    designed = design_plan(read_cell(cell), PlanSize(parallel, varied, seed), beside)
+    designed = design_plan(read_cell(cell), PlanSize(parallel, varied, seed, by_hand), beside)
     size = f"--parallel {parallel} --varied {varied} --seed {seed}"
+    size += " --by-hand" if by_hand else ""
     comment = f"Made by `cell plan {cell.name} {size}`."
     try:
         path.write_text(yaml_text(designed.as_mapping(), comment=comment), encoding="utf-8")

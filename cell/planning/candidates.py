@@ -17,6 +17,8 @@ _EDGE = 0.03
 """Share of the image kept free along every edge: the layout is known to a centimetre or two."""
 _ROLLS_RAD = np.radians([0.0, 180.0, 90.0, -90.0])
 TILT_RAD = (np.radians(12.0), np.radians(42.0))
+BY_HAND_TILT_RAD = (np.radians(15.0), np.radians(3.0))
+"""Tilt of the nearest and of the farthest view when a board is photographed by hand."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +82,24 @@ def parallel(sight: Sight, distance_m: float) -> Iterator[RigidTransform]:
             yield view
 
 
-def varied(sight: Sight, distances_m: tuple[float, float], seed: int) -> Iterator[RigidTransform]:
-    """Endless tilted views (camera_from_board), spread evenly over what may vary."""
+def varied(
+    sight: Sight, distances_m: tuple[float, float], seed: int, *, by_hand: bool = False
+) -> Iterator[RigidTransform]:
+    """Endless tilted views (camera_from_board), spread evenly over what may vary.
+
+    `by_hand`: most of them near and tilted, the far ones flat, as a board is photographed by
+    hand. Perspective then comes from the near views, and a lens that breathes biases Zhang's fit
+    most; a plan to show that, not to calibrate by.
+    """
     spread = qmc.Halton(5, seed=seed)
     while True:
         tilt, azimuth, roll, far, corner = spread.random()[0]
         axis = np.array([np.cos(2 * np.pi * azimuth), np.sin(2 * np.pi * azimuth), 0.0])
-        turn = Rotation.from_rotvec((TILT_RAD[0] + tilt * np.ptp(TILT_RAD)) * axis)
+        far = far**3 if by_hand else far
+        angle = TILT_RAD[0] + tilt * np.ptp(TILT_RAD)
+        if by_hand:
+            angle = np.interp(far, [0, 1], BY_HAND_TILT_RAD) * (0.7 + 0.6 * tilt)
+        turn = Rotation.from_rotvec(angle * axis)
         turn = Rotation.from_rotvec([0.0, 0.0, 2 * np.pi * roll]) * turn
         distance = distances_m[0] + far * (distances_m[1] - distances_m[0])
         view = _pushed_aside(sight, turn, distance, 2 * np.pi * corner)

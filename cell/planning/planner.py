@@ -36,11 +36,14 @@ class PlanSize:
         Tilted views all over the image and the distances.
     seed:
         Of the spread of the varied views.
+    by_hand:
+        Tilt the near views and leave the far ones flat, see `candidates.varied`.
     """
 
     parallel: int = 16
     varied: int = 24
     seed: int = 1
+    by_hand: bool = False
 
 
 @dataclass(frozen=True)
@@ -106,9 +109,8 @@ def _parallel(cell: CellFile, layout: Layout, guard: Guard, size: PlanSize) -> I
 
 
 def _varied(cell: CellFile, layout: Layout, guard: Guard, size: PlanSize) -> Iterator[_Candidate]:
-    tries = islice(
-        varied(Sight.of(cell), layout.distances_m, size.seed), _TRIES_PER_VIEW * size.varied
-    )
+    views = varied(Sight.of(cell), layout.distances_m, size.seed, by_hand=size.by_hand)
+    tries = islice(views, _TRIES_PER_VIEW * size.varied)
     yield from islice(_reachable("varied", tries, cell, layout, guard), size.varied)
 
 

@@ -116,3 +116,23 @@ def test_a_plan_survives_writing_and_reading(tmp_path: Path) -> None:
     assert isinstance(back.file, PlanFile)
     assert back.file == inline
     assert back.cell == plan.cell
+
+
+def test_the_plan_by_hand_tilts_the_near_views_and_leaves_the_far_ones_flat() -> None:
+    path = CONFIGS / "irb140-eosens-by-hand.plan.yaml"
+    made = design_plan(
+        read_cell(CONFIGS / "irb140-eosens.cell.yaml"),
+        PlanSize(by_hand=True),
+        "irb140-eosens.cell.yaml",
+    )
+    stored = read_plan(path)
+    for planned, view in zip(made.views, stored.file.views, strict=True):
+        np.testing.assert_allclose(planned.joints_deg, view.joints_deg, atol=1e-3)
+    layout, kinematics = stored.cell.layout, Guard.of(stored).kinematics
+    assert layout is not None
+    chosen = [v for v in stored.file.views if v.station == "varied"]
+    flange = kinematics.forward(np.radians([v.joints_deg for v in chosen]))
+    camera = rigid.inverse(flange @ layout.mounted.transform().as_matrix())
+    board = camera @ layout.fixed.transform().as_matrix()
+    tilt_deg, depth_m = np.degrees(np.arccos(board[:, 2, 2])), board[:, 2, 3]
+    assert tilt_deg[depth_m < 0.5].min() > tilt_deg[depth_m > 0.8].max()
