@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from calib.chain.model import CellModel
 from calib.detection import Detection
 from cell.calibrate import calibrate_into, detect_corners
+from cell.cli.output import say
 from cell.cli.progress import run_progress
 from cell.cli.summary import calibration_summary, diagnosis_summary
 from cell.diagnose import diagnose_into
@@ -17,6 +19,7 @@ from cell.recording import Corners, Recording, read_recording, write_corners
 from cell.recording.corners import FILE_NAME as DETECTIONS
 from cell.sequencer.session import record_plan
 from cell.sequencer.states import Finish, RunResult
+from cell.simulated import home_of, simulated_cell
 
 
 def record(plan_path: Path, folder: Path, *, dry_run: bool, resume: bool) -> RunResult:
@@ -29,10 +32,18 @@ def record(plan_path: Path, folder: Path, *, dry_run: bool, resume: bool) -> Run
     """
     plan = read_plan(plan_path)
     devices = simulated_devices(plan) if dry_run else real_devices(plan)
+    devices_are = "SIMULATED arm and camera" if dry_run else "real arm and camera"
+    say(f"{devices_are}; plan {plan_path}; recording {folder}")
     with run_progress(simulated=dry_run) as listener:
         return record_plan(
             plan, folder, devices, simulated=dry_run, resume=resume, listener=listener
         )
+
+
+def truth_of(plan_path: Path) -> CellModel:
+    """The simulated cell behind a plan's dry run."""
+    plan = read_plan(plan_path)
+    return simulated_cell(plan.cell, home_of(plan)).model
 
 
 @dataclass(frozen=True)
@@ -68,8 +79,12 @@ class Outcome:
         return cls(folder, complete, text, mapping)
 
 
-def evaluate(outcome: Outcome, result: RunResult, *, simulated: bool) -> Outcome:
+def evaluate(
+    outcome: Outcome, result: RunResult, *, simulated: bool, truth: CellModel | None = None
+) -> Outcome:
     """Calibrate and diagnose a finished run; the results go into the recording's folder.
+
+    `truth` is the simulated cell of a dry run; the report holds the results against it.
 
     Raises
     ------
@@ -81,7 +96,9 @@ def evaluate(outcome: Outcome, result: RunResult, *, simulated: bool) -> Outcome
         corners = corners_of_run(recording, result.detections)
         write_corners(outcome.folder / DETECTIONS, corners, recording.board)
     calibrated, folder = calibrate_into(recording, outcome.folder, simulated=simulated)
-    diagnosed = diagnose_into(recording, folder, simulated=simulated, calibrated=calibrated)
+    diagnosed = diagnose_into(
+        recording, folder, simulated=simulated, calibrated=calibrated, truth=truth
+    )
     found = [calibration_summary(calibrated.mapping), diagnosis_summary(diagnosed.mapping)]
     files = ("calibration.json", "diagnosis.json", "twin.yaml", "report.html")
     return replace(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, new_folder, say, show
+from cell.cli.output import JsonFlag, new_folder, say, say_error, show
 from cell.errors import InputError
 
 DEFAULT_PLAN = Path(__file__).parents[1] / "defaults" / "irb140-eosens.plan.yaml"
@@ -30,21 +30,20 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Move, grab and log every view of a plan, then calibrate, diagnose and report."""
-    from cell.run import Outcome, evaluate, record
+    from cell.run import Outcome, evaluate, record, truth_of
 
     path = _plan_path(plan, dry_run)
     folder = _folder(path, output, resume)
-    if dry_run:
-        say(f"SIMULATED arm and camera; plan {path}; recording {folder}")
     result = record(path, folder, dry_run=dry_run, resume=resume)
     outcome = Outcome.of(result, folder)
     for view, reason in result.skipped.items():
         say(f"skipped view {view}: {reason}")
     if outcome.complete and not record_only:
-        outcome = evaluate(outcome, result, simulated=dry_run)
+        truth = truth_of(path) if dry_run else None
+        outcome = evaluate(outcome, result, simulated=dry_run, truth=truth)
     show(outcome.text, outcome.mapping, as_json=as_json)
     if result.reason:
-        say(f"error: {result.reason}")
+        say_error(result.reason)
     raise typer.Exit(result.finish.exit_status)
 
 

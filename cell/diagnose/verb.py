@@ -13,6 +13,7 @@ import numpy as np
 
 from calib.chain.effect import Present
 from calib.chain.effects import catalogue
+from calib.chain.model import CellModel
 from calib.discovery.diagnose import diagnose
 from calib.discovery.diagnosis import Diagnosis
 from calib.errors import CalibrationError
@@ -30,7 +31,7 @@ from cell.diagnose.prediction import AFTER, BEFORE, write_prediction
 from cell.diagnose.twin import twin_text
 from cell.errors import BadAnswer, InputError
 from cell.recording import Corners, Recording, frames_as_views, read_frames
-from cell.report import diagnosis_evidence, write_report
+from cell.report import diagnosis_evidence, simulation_truth, write_report
 
 DIAGNOSIS = "diagnosis.json"
 TWIN = "twin.yaml"
@@ -55,6 +56,7 @@ def diagnose_into(
     progress: Progress | None = None,
     simulated: bool = False,
     calibrated: Calibrated | None = None,
+    truth: CellModel | None = None,
 ) -> Diagnosed:
     """`cell diagnose`.
 
@@ -74,6 +76,8 @@ def diagnose_into(
         Puts the banner on the report.
     calibrated:
         The recording's calibration, where it was made already; it goes into the report.
+    truth:
+        The simulated cell that made the recording, for the report alone.
 
     Raises
     ------
@@ -98,7 +102,7 @@ def diagnose_into(
         rows = np.isin(found.log.frame, ahead.frame)
         write_prediction(folder / BEFORE, found.plain.model, found.log.take(rows))
         write_prediction(folder / AFTER, found.twin.model, found.log.take(rows))
-    _report(recording, folder, corners, found, mapping, simulated, calibrated)
+    _report(recording, folder, corners, found, mapping, simulated, calibrated, truth)
     return Diagnosed(found, mapping, folder)
 
 
@@ -153,6 +157,7 @@ def _report(
     mapping: dict[str, Any],
     simulated: bool,
     calibrated: Calibrated | None,
+    truth: CellModel | None,
 ) -> None:
     if calibrated is None:
         calibrated = calibrate_recording(recording, corners)
@@ -166,4 +171,6 @@ def _report(
         corner_px=noise.corner_px,
         flange_m=noise.flange_m,
     )
-    write_report(folder / REPORT, replace(data, diagnosis=mapping, evidence=evidence))
+    known = None if truth is None else simulation_truth(truth, data.views)
+    data = replace(data, diagnosis=mapping, evidence=evidence, truth=known)
+    write_report(folder / REPORT, data)

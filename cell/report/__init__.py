@@ -6,6 +6,7 @@ from cell.report.data import Evidence, ReportData, SolutionPoses, Truth
 from cell.report.from_calibration import solution_poses, solution_residuals
 from cell.report.from_diagnosis import diagnosis_evidence
 from cell.report.from_recording import recording_data
+from cell.report.from_simulation import simulation_truth
 from cell.report.page import write_report
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Truth",
     "diagnosis_evidence",
     "recording_data",
+    "simulation_truth",
     "solution_poses",
     "solution_residuals",
     "write_report",

@@ -13,6 +13,8 @@ from calib.chain.model import CellModel, predict
 from calib.chain.optics import optics_row
 from calib.views import Board, Views
 from cell.report.from_diagnosis import diagnosis_evidence
+from cell.report.from_simulation import simulation_truth
+from cell.report.geometry import distance_m
 from cell.report.pose_errors import pose_errors, scale_at_robot_depth, without_constant_part
 
 ALPHA_PX = 1500.0
@@ -88,3 +90,19 @@ def test_frames_the_diagnosis_left_out_are_missing_after_and_there_before() -> N
     assert 1e-3 < found.cost_m["focus_breathing"] < np.sqrt(np.nanmean((bare**2).sum(axis=1)))
     assert found.board_offset_m is not None
     assert np.ptp(found.board_offset_m[:, 2]) == pytest.approx(4e-4, rel=0.02)
+
+
+def test_the_truth_is_the_simulated_cell_at_the_logged_poses() -> None:
+    breathing = make_effect("focus_breathing", {"law": "inverse_square", "k_px_m2": 6.0})
+    views = log()
+    truth = simulation_truth(plain().with_effects([breathing]), views)
+    assert truth.board_from_camera is not None
+    assert truth.alpha_px is not None
+    distance = distance_m(truth.board_from_camera, views.board)
+    assert truth.alpha_px == pytest.approx(ALPHA_PX - 6.0 / distance**2)
+    assert truth.effects == ("focus breathing:inverse square",)
+
+
+def test_a_board_that_looks_alike_from_both_ends_gives_no_true_poses() -> None:
+    views = replace(log(), board=Board("chessboard", 8, 10, 0.025))
+    assert simulation_truth(plain(), views).board_from_camera is None
