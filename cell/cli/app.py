@@ -13,6 +13,7 @@ from cell.cli.diagnose import diagnose
 from cell.cli.doctor import doctor
 from cell.cli.export import export
 from cell.cli.importing import import_
+from cell.cli.output import say_error
 from cell.cli.plan import plan
 from cell.cli.run import run
 from cell.cli.simulate import simulate
@@ -50,5 +51,5 @@ def main() -> None:
         status = exit_status_of(error)
         if status is None:
             raise
-        sys.stderr.write(f"error: {error}\n")
+        say_error(str(error))
         sys.exit(status)

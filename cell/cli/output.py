@@ -26,6 +26,11 @@ def say(text: str) -> None:
     sys.stderr.write(text + "\n")
 
 
+def say_error(text: str) -> None:
+    """Tell an error; several, one a line, stand below each other with their file and line first."""
+    say(f"error:\n{text}" if "\n" in text else f"error: {text}")
+
+
 def new_folder(name: str) -> Path:
     """A folder under `runs/` for results whose place was not given."""
     words = "".join(c if c.isalnum() or c in "-_" else "-" for c in name).strip("-")

@@ -48,8 +48,8 @@ def parse_model(path: Path, data: CommentedMap, model: type[Model]) -> Model:
         return model.model_validate(data)
     except ValidationError as invalid:
         known = sorted(_field_names(model))
-        lines = [_error_line(path, data, error, known) for error in invalid.errors()]
-        raise InputError("\n".join(dict.fromkeys(lines))) from None
+        told = sorted(_placed_error(path, data, error, known) for error in invalid.errors())
+        raise InputError("\n".join(dict.fromkeys(line for _, line in told))) from None
 
 
 def read_mapping(path: Path) -> CommentedMap:
@@ -110,11 +110,14 @@ def _yaml_fault(path: Path, broken: YAMLError) -> str:
     return f"{place}: is not valid YAML: {problem}"
 
 
-def _error_line(path: Path, data: CommentedMap, error: ErrorDetails, known: list[str]) -> str:
+def _placed_error(
+    path: Path, data: CommentedMap, error: ErrorDetails, known: list[str]
+) -> tuple[tuple[int, int], str]:
+    """Where an error stands, and its line for the operator."""
     location = _real_location(data, error["loc"])
     line, column = position_of(data, location)
     name = ".".join(str(part) for part in location) or "(whole file)"
-    return f"{path}:{line}:{column}: {name}: {_message(error, known)}"
+    return (line, column), f"{path}:{line}:{column}: {name}: {_message(error, known)}"
 
 
 def _message(error: ErrorDetails, known: list[str]) -> str:
