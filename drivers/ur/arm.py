@@ -24,7 +24,8 @@ from drivers.ur.reader import Packet, RtdeReader
 from drivers.ur.settings import URSettings
 from drivers.ur.speed import leading_joint_speed_rad_s, tcp_speed_m_s
 from drivers.ur.status import Runtime, fault_in
-from drivers.ur.supervisor import Supervisor, at_rest
+from drivers.ur.supervisor import Supervisor
+from drivers.ur.verdicts import at_rest
 
 _log = logging.getLogger("cell.drivers")
 _JOINT_LIMIT_RAD = 6.3

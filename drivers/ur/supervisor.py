@@ -16,30 +16,19 @@ from __future__ import annotations
 import threading
 import time
 
-import numpy as np
-
 from drivers.errors import DeviceError, DeviceUnreachable
 from drivers.ur.motion import ChildOptions, MotionChild, MoveOrder, Phase
-from drivers.ur.pose import transform_of
 from drivers.ur.reader import Packet, RtdeReader
 from drivers.ur.remote import RemoteWatch
 from drivers.ur.settings import URSettings
-from drivers.ur.status import Runtime, fault_in
+from drivers.ur.status import fault_in
 from drivers.ur.stop_paths import StopPaths
+from drivers.ur.verdicts import ProgramWatch, at_rest, missed
 
-AT_REST_RAD_S = 0.01
 _CYCLE_S = 0.01
 _BEAT_S = 0.2
 _RESEND_S = 0.05
 _STOP_CONFIRM_S, _REPEAT_S = 1.0, 3.0
-_ACCEPT_S = 1.0
-_PROGRAM_GRACE_S = 0.1
-_ARRIVED_RAD, _ARRIVED_M = 0.01, 0.002
-
-
-def at_rest(packet: Packet) -> bool:
-    """Whether every joint stands, judged by the controller's own measured speeds."""
-    return max(map(abs, packet.vector("actual_qd"))) < AT_REST_RAD_S
 
 
 class Supervisor:
@@ -73,7 +62,7 @@ class Supervisor:
         self._child_wanted = False
         self._order: MoveOrder | None = None
         self._order_sent = False
-        self._playing_s = time.monotonic()
+        self._program = ProgramWatch(settings.start_timeout_s)
         self._beat_s = 0.0
         self._stop_s: float | None = None
         self._resent_s = 0.0
@@ -158,7 +147,7 @@ class Supervisor:
 
     def _watch(self, packet: Packet) -> None:
         told = fault_in(packet)
-        fault = told or self._remote.fault or self._child_fault(packet)
+        fault = told or self._remote.fault or self._program.fault(self._child, packet)
         if fault is not None:
             self._trip(fault)
         # the child may notice before the packet comes that tells why
@@ -192,27 +181,6 @@ class Supervisor:
             self._stops.order()
             self._resent_s = now
 
-    def _child_fault(self, packet: Packet) -> str | None:
-        child = self._child
-        if child is None:
-            return None
-        if child.phase is Phase.FAILED:
-            return _why(child, packet)
-        if child.phase is Phase.STARTING:
-            slow = child.in_phase_s > self._settings.start_timeout_s
-            return "the control script did not start in time" if slow else None
-        if child.phase is Phase.ORDERED and child.in_phase_s > _ACCEPT_S:
-            return "the controller did not take the motion in time"
-        return self._program_fault(packet)
-
-    def _program_fault(self, packet: Packet) -> str | None:
-        runtime = Runtime(int(packet.number("runtime_state")))
-        if runtime is Runtime.PLAYING:
-            self._playing_s = time.monotonic()
-        if time.monotonic() - self._playing_s < _PROGRAM_GRACE_S:
-            return None
-        return _program_gone(runtime)
-
     def _drive(self, packet: Packet) -> None:
         if self._child is None:
             if self._child_wanted or self._order is not None:
@@ -220,17 +188,15 @@ class Supervisor:
             return
         self._beat()
         if self._child.phase is not Phase.READY or self._order is None:
-            if self._child.phase is Phase.STARTING:
-                self._playing_s = time.monotonic()
             return
         if not self._order_sent:
             self._child.move(self._order)
             self._order_sent = True
         elif at_rest(packet):
             order, self._order = self._order, None
-            missed = _missed(order, packet)
-            if missed is not None:
-                self._trip(missed)
+            off = missed(order, packet)
+            if off is not None:
+                self._trip(off)
 
     def _beat(self) -> None:
         if self._child is not None and time.monotonic() - self._beat_s > _BEAT_S:
@@ -246,28 +212,3 @@ class Supervisor:
             if time.monotonic() > deadline:
                 raise DeviceError("the control script did not start in time")
             time.sleep(_CYCLE_S)
-
-
-def _program_gone(runtime: Runtime) -> str:
-    return (
-        f"the control program on the robot is {runtime.name.lower()}: somebody stopped it at the "
-        "teach pendant, another client took its place, or the watchdog ended it"
-    )
-
-
-def _why(child: MotionChild, packet: Packet) -> str:
-    runtime = Runtime(int(packet.number("runtime_state")))
-    gone = child.was_ready and runtime is not Runtime.PLAYING
-    return _program_gone(runtime) if gone else child.why
-
-
-def _missed(order: MoveOrder, packet: Packet) -> str | None:
-    """Return how far from its target the motion ended, or None where it arrived."""
-    if order.order == "move_j":
-        off_rad = np.abs(np.subtract(packet.vector("actual_q"), order.target)).max()
-        return f"the motion ended {off_rad:.3f} rad off" if off_rad > _ARRIVED_RAD else None
-    off = transform_of(packet.vector("actual_TCP_pose")).inv() * transform_of(order.target)
-    off_m, off_rad = float(np.linalg.norm(off.translation)), float(off.rotation.magnitude())
-    if off_m > _ARRIVED_M or off_rad > _ARRIVED_RAD:
-        return f"the motion ended {off_m * 1e3:.1f} mm and {off_rad:.3f} rad off"
-    return None

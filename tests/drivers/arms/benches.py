@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -24,6 +25,7 @@ from sim.peers.abb import ABBController
 from sim.peers.ur import URController
 
 UR_HOME = (0.1, -1.4, 1.6, -1.7, -1.5, 0.2)
+UR_FAR = tuple(angle + 0.6 for angle in UR_HOME)
 _numbers = itertools.count(2)
 
 
@@ -196,3 +198,22 @@ def unreachable(arm: Arm) -> bool:
     except (DeviceUnreachable, StopFailed):
         return True
     return False
+
+
+@contextmanager
+def ur_moving(**settings: Any) -> Iterator[tuple[URArm, URController, SimArm]]:
+    """A UR arm on its way to `UR_FAR`."""
+    with ur_peer() as (controller, sim):
+        arm = URArm(controller.address, URSettings(**{"start_timeout_s": 3.0, **settings}))
+        try:
+            arm.connect()
+            arm.start_move(slowly(UR_FAR))
+            assert until(lambda: truly_moving(sim))
+            time.sleep(0.1)
+            yield arm, controller, sim
+        finally:
+            arm.close()
+
+
+def at_speed(joints_rad: tuple[float, ...], tcp_speed_m_s: float) -> MoveTarget:
+    return MoveTarget(joints_rad=joints_rad, joint_speed_rad_s=1.0, tcp_speed_m_s=tcp_speed_m_s)

@@ -8,7 +8,6 @@ that is too slow by design is too slow three times.
 import os
 import random
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -17,6 +16,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from benches import (
+    UR_FAR,
     UR_HOME,
     halted_s,
     quickly,
@@ -25,38 +25,18 @@ from benches import (
     truly_moving,
     unreachable,
     until,
+    ur_moving,
     ur_peer,
     wait_steady,
 )
-from scipy.spatial.transform import RigidTransform
 
-from calib.chain.kinematics import arm as kinematics_of
-from drivers.arm import Motion, MoveTarget
+from drivers.arm import Motion
 from drivers.errors import ArmStopped, DeviceError, DeviceRefused, DeviceUnreachable, StopFailed
-from drivers.ur import URArm, URSettings
-from drivers.ur.kinematics_info import read_kinematics
-from drivers.ur.pose import transform_of
-from drivers.ur.wire import RTDE_PORT, Frame, encode, receive
+from drivers.ur import URArm
 from sim.peers.ur import Runtime
 
 GOAL_S = 0.1
 WATCHDOG_S = 0.25
-FAR = tuple(angle + 0.6 for angle in UR_HOME)
-
-
-@contextmanager
-def moving(**settings):
-    """A UR arm on its way to `FAR`."""
-    with ur_peer() as (controller, sim):
-        arm = URArm(controller.address, URSettings(**{"start_timeout_s": 3.0, **settings}))
-        try:
-            arm.connect()
-            arm.start_move(slowly(FAR))
-            assert until(lambda: truly_moving(sim))
-            time.sleep(0.1)
-            yield arm, controller, sim
-        finally:
-            arm.close()
 
 
 def best_of_three(measure, goal_s):
@@ -95,7 +75,7 @@ def child_of(arm):
 @pytest.mark.parametrize("fault", [None, drop, mute, frozen_child, dead_child])
 def test_a_stop_request_reaches_the_arm_within_100_ms_whatever_ails_the_link(fault):
     def measure():
-        with moving() as (arm, controller, sim):
+        with ur_moving() as (arm, controller, sim):
             since_s = time.monotonic()
             if fault is not None:
                 fault(controller, arm)
@@ -123,7 +103,7 @@ def test_a_stop_request_reaches_the_arm_within_100_ms_whatever_ails_the_link(fau
 )
 def test_the_arm_is_stopped_even_if_nobody_asks(fault, goal_s):
     def measure():
-        with moving() as (arm, controller, sim):
+        with ur_moving() as (arm, controller, sim):
             since_s = time.monotonic()
             fault(controller, arm)
             latency_s = halted_s(controller, since_s)
@@ -136,7 +116,7 @@ def test_the_arm_is_stopped_even_if_nobody_asks(fault, goal_s):
 
 @pytest.mark.parametrize("fault", [drop, mute], ids=["drop", "mute"])
 def test_after_a_lost_link_old_poses_are_not_told_as_new_ones(fault):
-    with moving() as (arm, controller, _):
+    with ur_moving() as (arm, controller, _):
         fault(controller, arm)
         time.sleep(0.4)
         with pytest.raises(DeviceUnreachable, match="no robot state"):
@@ -146,7 +126,7 @@ def test_after_a_lost_link_old_poses_are_not_told_as_new_ones(fault):
 
 
 def test_after_a_lost_link_the_arm_can_be_connected_again():
-    with moving() as (arm, controller, sim):
+    with ur_moving() as (arm, controller, sim):
         controller.drop()
         assert until(lambda: not truly_moving(sim))
         arm.connect()
@@ -155,7 +135,7 @@ def test_after_a_lost_link_the_arm_can_be_connected_again():
 
 
 def test_a_dead_controller_holds_nobody_up():
-    with moving() as (arm, controller, _):
+    with ur_moving() as (arm, controller, _):
         controller.kill()
         begin_s = time.monotonic()
         with pytest.raises(StopFailed, match="emergency stop"):
@@ -180,7 +160,7 @@ def test_a_controller_that_never_answers_is_told_as_such_and_freezes_nothing():
 @contextmanager
 def frozen_in_constructor(**settings):
     """A UR arm whose child is told to move and waits for ever in ur-rtde's constructor."""
-    with moving(**settings) as (arm, controller, sim):
+    with ur_moving(**settings) as (arm, controller, sim):
         arm.stop()
         wait_steady(arm)
         controller.ignore_new_clients = True
@@ -219,7 +199,7 @@ def test_a_stop_takes_no_notice_of_a_constructor_that_never_returns():
 def test_faults_at_random_instants_leave_the_arm_standing_and_are_told(seed):
     chance = random.Random(seed)
     fault = chance.choice([drop, mute, dead_child, frozen_child, local_mode])
-    with moving() as (arm, controller, sim):
+    with ur_moving() as (arm, controller, sim):
         time.sleep(chance.uniform(0.0, 0.5))
         fault(controller, arm)
 
@@ -255,7 +235,7 @@ time.sleep(60)
 def test_the_arm_stops_when_our_process_is_gone_on_the_way(ending, goal_s):
     def measure():
         with ur_peer() as (controller, sim):
-            command = [sys.executable, "-c", _MOVE_AND_WAIT, controller.address, *map(str, FAR)]
+            command = [sys.executable, "-c", _MOVE_AND_WAIT, controller.address, *map(str, UR_FAR)]
             with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
                 assert process.stdout.readline() == b"moving\n"
                 assert until(lambda: truly_moving(sim))
@@ -271,7 +251,7 @@ def test_the_arm_stops_when_our_process_is_gone_on_the_way(ending, goal_s):
 
 
 def test_a_protective_stop_ends_the_program_so_that_unlocking_does_not_drive_on():
-    with moving() as (arm, controller, sim):
+    with ur_moving() as (arm, controller, sim):
         controller.protective_stop()
         assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT)
         assert "protective stop" in arm.state().fault
@@ -286,7 +266,7 @@ def test_a_protective_stop_ends_the_program_so_that_unlocking_does_not_drive_on(
 
 def test_a_protective_stop_left_paused_would_have_driven_on():
     # the hazard itself, so that the test above means something
-    with moving() as (arm, controller, sim):
+    with ur_moving() as (arm, controller, sim):
         arm._supervisor._closing.set()
         arm._supervisor._thread.join()
         controller.protective_stop()
@@ -298,7 +278,7 @@ def test_a_protective_stop_left_paused_would_have_driven_on():
 
 
 def test_recovering_from_a_protective_stop_obeys_the_five_second_rule():
-    with moving() as (arm, controller, sim):
+    with ur_moving() as (arm, controller, sim):
         controller.protective_stop()
         assert until(lambda: arm.state().fault is not None)
         with pytest.raises(DeviceRefused, match="5s"):
@@ -312,7 +292,7 @@ def test_recovering_from_a_protective_stop_obeys_the_five_second_rule():
 
 
 def test_an_emergency_stop_is_told_with_what_to_do():
-    with moving() as (arm, controller, sim):
+    with ur_moving() as (arm, controller, sim):
         controller.emergency_stop()
         assert until(lambda: arm.state().fault is not None)
         assert "emergency stop" in arm.state().fault
@@ -323,7 +303,7 @@ def test_an_emergency_stop_is_told_with_what_to_do():
 
 
 def test_a_program_stopped_at_the_pendant_is_a_fault_and_not_a_pause():
-    with moving() as (arm, controller, sim):
+    with ur_moving() as (arm, controller, sim):
         controller.stop_program("teach pendant")
         assert until(lambda: arm.state().fault is not None)
         assert "teach pendant" in arm.state().fault
@@ -333,141 +313,9 @@ def test_a_program_stopped_at_the_pendant_is_a_fault_and_not_a_pause():
         assert stays(sim)
 
 
-def test_local_mode_is_refused_with_the_remedy():
-    with ur_peer() as (controller, _):
-        controller.remote_control = False
-        with pytest.raises(DeviceRefused, match="Remote Control"):
-            URArm(controller.address).connect()
-
-
 def test_a_switch_to_local_mode_stops_the_run():
-    with moving() as (arm, controller, sim):
+    with ur_moving() as (arm, controller, sim):
         controller.remote_control = False
         assert until(lambda: arm.state().fault is not None, 2.0)
         assert "local mode" in arm.state().fault
         assert until(lambda: not truly_moving(sim), 1.0)
-
-
-LOWER_REGISTERS = frozenset(
-    f"input_{kind}_register_{i}" for kind in ("int", "double") for i in range(24)
-)
-
-
-def test_registers_held_by_a_fieldbus_are_told_and_the_upper_ones_serve():
-    with ur_peer() as (controller, _):
-        controller.reserved_inputs = LOWER_REGISTERS
-        with pytest.raises(DeviceRefused, match="upper_registers"):
-            URArm(controller.address).connect()
-        arm = URArm(controller.address, URSettings(upper_registers=True))
-        try:
-            arm.connect()
-            arm.start_move(quickly(FAR))
-            assert wait_steady(arm).joints_rad == pytest.approx(FAR, abs=1e-6)
-        finally:
-            arm.close()
-
-
-def test_registers_held_by_another_client_are_told():
-    with (
-        ur_peer() as (controller, _),
-        holding_registers(controller.address),
-        pytest.raises(DeviceRefused, match="another client"),
-    ):
-        URArm(controller.address).connect()
-
-
-@contextmanager
-def holding_registers(address):
-    with socket.create_connection((address, RTDE_PORT)) as link:
-        link.sendall(encode(Frame.SETUP_INPUTS, b"input_int_register_0"))
-        receive(link)
-        yield
-
-
-def test_a_program_that_is_not_ours_is_left_running():
-    with moving() as (_, controller, sim):
-        with pytest.raises(DeviceRefused, match="program is running"):
-            URArm(controller.address).connect()
-        assert truly_moving(sim)
-        assert controller.runtime is Runtime.PLAYING
-
-
-def test_a_controller_too_old_for_the_tool_offset_is_refused():
-    with ur_peer() as (controller, _):
-        controller.missing_outputs = frozenset({"tcp_offset"})
-        with pytest.raises(DeviceRefused, match="tcp_offset"):
-            URArm(controller.address).connect()
-
-
-def test_nobody_there_is_told_as_such():
-    with pytest.raises(DeviceUnreachable, match="Check power, cable and address"):
-        URArm("127.255.255.254").connect()
-
-
-def test_every_reading_is_of_one_instant_even_on_the_way():
-    forward = kinematics_of("ur5e").forward
-    with moving() as (arm, controller, _):
-        controller.tcp_offset = (0.0, 0.05, 0.2, 0.4, 0.0, 0.0)
-        for _ in range(50):
-            state = arm.state()
-            assert state.motion is Motion.MOVING
-            expected = RigidTransform.from_matrix(forward(np.array(state.joints_rad)))
-            off = state.base_from_flange.inv() * expected
-            assert np.linalg.norm(off.translation) < 1e-9
-            time.sleep(0.005)
-
-
-def test_the_raw_packet_is_kept_for_the_log():
-    with moving() as (arm, controller, _):
-        state = arm.state()
-        offset, tcp = state.raw["tcp_offset"], state.raw["actual_TCP_pose"]
-        assert offset == controller.tcp_offset
-        back = state.base_from_flange * transform_of(offset)
-        assert np.allclose(back.as_matrix(), transform_of(tcp).as_matrix())
-        assert len(state.raw["kinematics"]["d_m"]) == 6
-        assert state.raw["model"] == "UR5"
-
-
-def test_the_pose_after_a_move_is_of_after_the_move():
-    with moving() as (arm, _, sim):
-        arm.stop()
-        wait_steady(arm)
-        for goal in (UR_HOME, tuple(angle + 0.1 for angle in UR_HOME)):
-            arm.start_move(quickly(goal))
-            state = wait_steady(arm)
-            off = state.base_from_flange.inv() * sim.state().base_from_flange
-            assert np.linalg.norm(off.translation) < 1e-9
-
-
-def test_the_factory_kinematics_are_read_and_put_the_flange_where_the_controller_does():
-    with ur_peer() as (controller, _):
-        found = read_kinematics(controller.address)
-        assert found.calibration_status == "linearised"
-        joints = np.random.default_rng(0).uniform(-2, 2, (5, 6))
-        expected = kinematics_of("ur5e").forward(joints)[:, :3, 3]
-        assert found.flange_positions_m(joints) == pytest.approx(expected, abs=1e-12)
-        controller.kinematics = None
-        assert read_kinematics(controller.address, timeout_s=0.3) is None
-
-
-@pytest.mark.parametrize("told", [True, False], ids=["kinematics told", "not told"])
-def test_the_flange_never_exceeds_its_speed_in_a_joint_move(told):
-    with ur_peer() as (controller, sim):
-        controller.kinematics = controller.kinematics if told else None
-        arm = URArm(controller.address)
-        arm.connect()
-        goal = (UR_HOME[0] + (0.2 if told else 0.05), *UR_HOME[1:])
-        arm.start_move(at_speed(goal, 0.05))
-        speeds = []
-        while arm.state().motion is Motion.MOVING:
-            truth = sim.truth()
-            jacobian = kinematics_of("ur5e").jacobian(truth.joints_rad)[:3]
-            speeds.append(np.linalg.norm(jacobian @ truth.joint_velocity_rad_s))
-            time.sleep(0.01)
-        arm.close()
-        assert max(speeds) <= 0.05 * 1.01
-        assert max(speeds) > (0.045 if told else 0.005)
-
-
-def at_speed(joints_rad, tcp_speed_m_s):
-    return MoveTarget(joints_rad=joints_rad, joint_speed_rad_s=1.0, tcp_speed_m_s=tcp_speed_m_s)
