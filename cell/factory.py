@@ -22,10 +22,18 @@ from drivers.camera import Camera
 
 def simulated_devices(plan: Plan, *, seed: int | None = None) -> Devices:
     """Simulated arm and camera in the place of a plan's own; raises `InputError`."""
+    from cell.log_slips import SLIPS
     from cell.simulated import home_of, simulated_cell
     from sim.build import build
     from sim.clock import SimClock
 
+    truth = plan.cell.simulation
+    slips = [effect.name for effect in truth.effects if effect.name in SLIPS] if truth else []
+    if slips:
+        raise InputError(
+            f"cell {plan.cell.name}: {', '.join(slips)} is a slip of the log, and this log is true;"
+            " `cell simulate` without --images can make it"
+        )
     clock = SimClock()
     arm, camera = build(simulated_cell(plan.cell, home_of(plan), seed=seed), clock)
     return Devices(arm, camera, clock)

@@ -15,13 +15,16 @@ from cell.errors import BadAnswer, InputError
 from cell.factory import simulated_devices
 from cell.files.cell_file import EffectFile
 from cell.files.plan_file import Plan
+from cell.log_slips import SLIPS, slip
 from cell.recording import Corners, FrameRecord, PoseRecord, RecordingWriter, write_corners
 from cell.recording.corners import FILE_NAME as DETECTIONS
 from cell.recording.header import Capture
 from cell.sequencer.session import header_of, record_plan
 from cell.simulated import home_of, log_of, present_effect, simulated_cell
+from sim.cell import SimulatedCell
 from sim.synthesize import synthesize
 
+_SLIP_STREAM = 101
 _COLUMNS = (
     "t_s",
     "joints_rad",
@@ -43,8 +46,11 @@ def simulate_corners(plan: Plan, folder: Path, seed: int | None = None) -> int:
         The cell has no truth to simulate, or a recording is in the way.
     """
     cell = simulated_cell(plan.cell, home_of(plan), seed=seed)
-    views = synthesize(cell, log_of(plan, cell))
+    views = _with_slips(plan, cell, synthesize(cell, log_of(plan, cell)))
     header = header_of(plan, simulated=True, images=False)
+    header = header.model_copy(
+        update={"robot": header.robot.model_copy(update={"model": views.robot_model})}
+    )
     if views.moving:
         header = header.model_copy(update={"capture": Capture(mode="moving")})
     corners = Corners(dict(zip(views.frame.tolist(), views.corners_px, strict=True)))
@@ -67,6 +73,15 @@ def simulate_pictures(plan: Plan, folder: Path, seed: int | None = None) -> int:
     if result.reason:
         raise BadAnswer(f"{folder}: {result.finish.words}: {result.reason}")
     return result.frames
+
+
+def _with_slips(plan: Plan, cell: SimulatedCell, views: Views) -> Views:
+    effects = plan.cell.simulation.effects if plan.cell.simulation else ()
+    rng = cell.random(_SLIP_STREAM)
+    for effect in effects:
+        if effect.name in SLIPS:
+            views = slip(views, effect, rng)
+    return views
 
 
 def _record(views: Views, index: int, more: Mapping[str, Any]) -> FrameRecord:
@@ -96,7 +111,8 @@ def with_effects(plan: Plan, effects: tuple[str, ...]) -> Plan:
         return plan
     parsed = tuple(parse_effect(text) for text in effects)
     for effect in parsed:
-        present_effect(plan.cell, effect)
+        if effect.name not in SLIPS:
+            present_effect(plan.cell, effect)
     cell = plan.cell.model_copy(update={"simulation": truth.model_copy(update={"effects": parsed})})
     return replace(plan, cell=cell)
 

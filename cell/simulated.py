@@ -14,6 +14,7 @@ from calib.views import FloatArray, Views
 from cell.errors import InputError
 from cell.files.cell_file import CellFile, EffectFile, Lens, Simulation
 from cell.files.plan_file import Plan
+from cell.log_slips import SLIPS
 from cell.sequencer.guard import Guard
 from sim.arm import Repeatability
 from sim.cell import CameraSpec, SimulatedCell
@@ -85,7 +86,9 @@ def _model(cell: CellFile, truth: Simulation) -> CellModel:
         optics=optics_row(**{"height_px": cell.camera.height, **truth.optics}),
         flange_from_mounted=truth.mounted.transform().as_matrix(),
         base_from_fixed=truth.fixed.transform().as_matrix(),
-        effects=tuple(present_effect(cell, effect) for effect in truth.effects),
+        effects=tuple(
+            present_effect(cell, effect) for effect in truth.effects if effect.name not in SLIPS
+        ),
     )
 
 

@@ -126,6 +126,31 @@ def test_an_effect_that_is_not_understood(
     assert message in said.err
 
 
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "frame_pose_offset:frames=1",
+        "frame_pose_swap:frames=4",
+        "length_unit:metres_per_unit=0.001",
+        "rotation_convention:law=scalar_first",
+        "robot_model:law=ur3e",
+    ],
+)
+def test_slips_of_the_log_change_poses_and_not_corners(
+    cell: Cell, tmp_path: Path, effect: str
+) -> None:
+    plan = ROOT / "configs" / "ur3-robotiq.plan.yaml"
+    for name, effects in (("true", "lens_sag"), ("slip", effect)):
+        said = cell("simulate", plan, "-o", tmp_path / name, "--effect", effects)
+        assert said.status == 0, said.err
+    true, slip = (read_recording(tmp_path / name).views() for name in ("true", "slip"))
+    np.testing.assert_array_equal(true.corners_px, slip.corners_px)
+    changed = np.abs(true.base_from_flange - slip.base_from_flange).max(axis=(1, 2)) > 1e-3
+    expected = {"frame_pose_offset": 38, "frame_pose_swap": 4}.get(effect.split(":")[0], 39)
+    assert changed.sum() == expected
+    assert slip.robot_model == ("ur3e" if effect.startswith("robot") else "ur3")
+
+
 def test_a_twin_is_simulated_at_its_logged_poses(cell: Cell, tmp_path: Path) -> None:
     (tmp_path / "twin.yaml").write_text(
         "schema: cell.plan/1\nname: twin\ncell:\n  "
