@@ -1,7 +1,7 @@
 """How the scale factor moves with distance: Eq. 25 with its sign free, a thin lens, a constant.
 
 `inverse_square`: alpha = alpha0 - k/d^2 (Eq. 25). `thin_lens`: alpha = alpha_inf d/(d - f), what a
-lens focused by moving as a whole does (facts: its sign is opposite to the paper's curve).
+lens focused by moving as a whole does (its sign is opposite to the paper's curve).
 `constant`: alpha. Which one the data prefer is told by AICc with a common unknown noise scale,
 so that a scatter larger than the corners' own (the robot's) does not pass for physics.
 """

@@ -91,7 +91,7 @@ def fit_homography(
 ) -> Homography:
     """Least-squares homography in pixels, wrong corners left out.
 
-    Cauchy weights find the wrong corners (facts: one corner 50 sigma off moves a plain fit
+    Cauchy weights find the wrong corners (measured: one corner 50 sigma off moves a plain fit
     by 4e-3); what is left is fitted unweighted, so that the covariance is the plain one.
 
     Parameters

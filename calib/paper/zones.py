@@ -1,7 +1,7 @@
 """Zones 1, 2, 3 of the scale factor over distance (paper, section 4.1), found from the data.
 
 Zone 1: the focal length moves with distance. Zone 2: it stands still; it begins at what the paper
-calls the hyperfocal distance (the word means a blur limit in optics, and lies far beyond: facts).
+calls the hyperfocal distance (in optics the word means a blur limit, which lies far beyond).
 Zone 3: the board is too small in the image for its scale factor to be worth anything.
 
 Near limit: where a curve with a corner in it beats every smooth law, its corner with its profile
