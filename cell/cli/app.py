@@ -9,6 +9,7 @@ from collections.abc import Callable
 import typer
 
 from cell.cli.calibrate import calibrate
+from cell.cli.compare import compare
 from cell.cli.diagnose import diagnose
 from cell.cli.doctor import doctor
 from cell.cli.export import export
@@ -31,6 +32,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "simulate": simulate,
     "calibrate": calibrate,
     "diagnose": diagnose,
+    "compare": compare,
     "export": export,
     "import": import_,
     "doctor": doctor,

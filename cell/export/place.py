@@ -9,17 +9,23 @@ from cell.errors import InputError
 _NAME = "calibration.json"
 
 
+def find_calibration(path: Path) -> Path | None:
+    """The file itself, or the `calibration.json` in a results folder or recording, or None."""
+    if not path.is_dir():
+        return path
+    candidates = (path / _NAME, path / "calibration" / _NAME)
+    return next((c for c in candidates if c.exists()), None)
+
+
 def calibration_file(path: Path) -> Path:
-    """The file itself, or the `calibration.json` in a results folder or a recording.
+    """The calibration that `path` means.
 
     Raises
     ------
     InputError
         A folder without one.
     """
-    if not path.is_dir():
-        return path
-    for candidate in (path / _NAME, path / "calibration" / _NAME):
-        if candidate.exists():
-            return candidate
-    raise InputError(f"{path}: holds no {_NAME}; make one with: cell calibrate {path}")
+    found = find_calibration(path)
+    if found is None:
+        raise InputError(f"{path}: holds no {_NAME}; make one with: cell calibrate {path}")
+    return found
