@@ -13,6 +13,7 @@ from cell.cli.output import say
 from cell.cli.progress import run_progress
 from cell.cli.summary import calibration_summary, diagnosis_summary
 from cell.diagnose import diagnose_into
+from cell.errors import BadAnswer
 from cell.factory import real_devices, simulated_devices
 from cell.files.plan_file import read_plan
 from cell.recording import Corners, Recording, read_recording, write_corners
@@ -95,19 +96,31 @@ def evaluate(
     if not recording.has_detections:
         corners = corners_of_run(recording, result.detections)
         write_corners(outcome.folder / DETECTIONS, corners, recording.board)
+    say("calibrating")
     calibrated, folder = calibrate_into(recording, outcome.folder, simulated=simulated)
-    diagnosed = diagnose_into(
-        recording, folder, simulated=simulated, calibrated=calibrated, truth=truth
-    )
-    found = [calibration_summary(calibrated.mapping), diagnosis_summary(diagnosed.mapping)]
-    files = ("calibration.json", "diagnosis.json", "twin.yaml", "report.html")
-    return replace(
+    calibrates = replace(
         outcome,
-        text="\n".join([outcome.text, *found, f"report: {folder / 'report.html'}"]),
-        mapping=outcome.mapping
-        | {Path(name).stem: str(folder / name) for name in files}
+        text=f"{outcome.text}\n{calibration_summary(calibrated.mapping)}",
+        mapping=outcome.mapping | _files(folder, "calibration.json", "report.html"),
+    )
+    say("diagnosing; this takes a minute or more")
+    try:
+        diagnosed = diagnose_into(
+            recording, folder, simulated=simulated, calibrated=calibrated, truth=truth
+        )
+    except BadAnswer as undiagnosed:
+        return replace(calibrates, text=f"{calibrates.text}\nnot diagnosed: {undiagnosed}")
+    return replace(
+        calibrates,
+        text=f"{calibrates.text}\n{diagnosis_summary(diagnosed.mapping)}",
+        mapping=calibrates.mapping
+        | _files(folder, "diagnosis.json", "twin.yaml")
         | {"verdict": diagnosed.mapping["verdict"]},
     )
+
+
+def _files(folder: Path, *names: str) -> dict[str, str]:
+    return {Path(name).stem: str(folder / name) for name in names}
 
 
 def corners_of_run(recording: Recording, found: dict[int, Detection]) -> Corners:

@@ -41,7 +41,9 @@ def run(
     if outcome.complete and not record_only:
         truth = truth_of(path) if dry_run else None
         outcome = evaluate(outcome, result, simulated=dry_run, truth=truth)
-    show(outcome.text, outcome.mapping, as_json=as_json)
+    report = outcome.mapping.get("report")
+    text = f"{outcome.text}\nreport: {report}" if report else outcome.text
+    show(text, outcome.mapping, as_json=as_json)
     if result.reason:
         say_error(result.reason)
     raise typer.Exit(result.finish.exit_status)
