@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from calib.chain.effect import Effect
 from calib.chain.model import CellModel, walk
 from calib.chain.rigid import inverse
 from calib.views import Views
@@ -20,5 +21,10 @@ def simulation_truth(model: CellModel, views: Views) -> Truth:
         board_from_camera=inverse(state.camera_from_board) if lopsided else None,
         alpha_px=state.column("alpha_px"),
         beta_px=state.column("beta_px"),
-        effects=tuple(present.effect.label.replace("_", " ") for present in model.effects),
+        effects=tuple(_words(present.effect) for present in model.effects),
     )
+
+
+def _words(effect: Effect) -> str:
+    name = effect.name if effect.law is None else f"{effect.name} ({effect.law})"
+    return name.replace("_", " ")

@@ -107,7 +107,8 @@ def millimetres(value_m: float | None, digits: int = 2) -> str:
 
 
 def _readable(value: float, sigma: float | None, unit: str) -> tuple[float, float | None, str]:
-    if unit not in _SMALLER or abs(value) >= 1.0:
+    exact = known(sigma) and 0 < sigma < _SMALL
+    if unit not in _SMALLER or (abs(value) >= 1.0 and not exact):
         return value, sigma, unit
     smaller, factor = _SMALLER[unit]
     return value * factor, None if sigma is None else sigma * factor, smaller

@@ -100,7 +100,7 @@ def test_the_truth_is_the_simulated_cell_at_the_logged_poses() -> None:
     assert truth.alpha_px is not None
     distance = distance_m(truth.board_from_camera, views.board)
     assert truth.alpha_px == pytest.approx(ALPHA_PX - 6.0 / distance**2)
-    assert truth.effects == ("focus breathing:inverse square",)
+    assert truth.effects == ("focus breathing (inverse square)",)
 
 
 def test_a_board_that_looks_alike_from_both_ends_gives_no_true_poses() -> None:

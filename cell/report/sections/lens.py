@@ -42,7 +42,7 @@ def lens(data: ReportData) -> str:
 def _zones(data: ReportData, zones: Mapping[str, Any] | None) -> str:
     if not zones:
         reason = (data.calibration or {}).get("zones_reason") or data.why_missing("zones")
-        return f"Zones were not found: {reason}."
+        return f"Zones were not found: {_words(reason)}."
     near = number(zones["near_limit_m"], "m")
     if known(zones.get("near_sigma_m")):
         near = f"{plus_minus(zones['near_limit_m'], zones['near_sigma_m'])} m"
@@ -85,7 +85,7 @@ def _difference(law: Mapping[str, Any], best: float | None) -> str:
 
 
 def _sentence(words: object) -> str:
-    text = str(words or "").rstrip(".")
+    text = _words(words or "").rstrip(".")
     return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
