@@ -39,6 +39,9 @@ class GenICamOptions:
     stale_frames:
         Without a trigger: how many newly arrived frames may have been exposed before the grab was
         called and are dropped; two where exposure and transfer overlap.
+    patience_s:
+        With a trigger: a frame that has not come so long after the end of its exposure is triggered
+        again, while the grab's time-out lasts.
     names, focus_names:
         The camera's names for its features.
     connect_timeout_s, setting_timeout_s, focus_timeout_s:
@@ -51,6 +54,7 @@ class GenICamOptions:
     features: Mapping[str, float | str] = field(default_factory=dict)
     software_trigger: bool = True
     stale_frames: int = 2
+    patience_s: float = 1.0
     names: FeatureNames = field(default_factory=FeatureNames)
     focus_names: FocusNames = field(default_factory=FocusNames)
     connect_timeout_s: float = 20.0
@@ -65,7 +69,7 @@ class _Taken:
     sent_s: float
     acknowledged_s: float
     arrived_s: float
-    incomplete: list[str]
+    missed: list[str]
 
 
 class OpenCamera:
@@ -112,17 +116,19 @@ class OpenCamera:
         return self._focus.set(setting)
 
     def grab(self, deadline_s: float) -> Frame:
-        """Trigger and return that frame; an incomplete one is taken again in the time."""
-        if self._unanswered_trigger:
-            self._session.arm()  # its frame may still come, and must not be taken for the next
-            self._unanswered_trigger = False
-        incomplete: list[str] = []
+        """Trigger and return that frame; one that is missed is taken again in the time."""
+        missed: list[str] = []
         while True:
+            if self._unanswered_trigger:
+                self._session.arm()  # its frame may still come, and must not be taken for the next
+                self._unanswered_trigger = False
             try:
-                return self._frame(self._take(deadline_s, incomplete))
-            except (IncompleteFrame, ValueError) as error:
+                return self._frame(self._take(deadline_s, missed))
+            except (IncompleteFrame, ValueError, FrameLost) as error:
+                if time.monotonic() + self.values.get("exposure_s", 0.0) >= deadline_s:
+                    raise self._lost_frame(missed, error) from None
                 _log.info("%s: %s; triggering again", self._device, error)
-                incomplete.append(str(error))
+                missed.append(str(error))
 
     def close(self) -> None:
         """Let go; a lost camera is not asked any more."""
@@ -171,14 +177,14 @@ class OpenCamera:
         except DeviceRefused:
             return  # the camera has no such trigger
 
-    def _take(self, deadline_s: float, incomplete: list[str]) -> _Taken:
+    def _take(self, deadline_s: float, missed: list[str]) -> _Taken:
         self._session.flush()
         sent_s = time.monotonic()
         self._trigger(deadline_s)
         acknowledged_s = time.monotonic()
         raw = self._fetch(deadline_s)
         image = decode(raw.data, raw.width, raw.height, raw.pixel_format)
-        return _Taken(raw, image, sent_s, acknowledged_s, time.monotonic(), incomplete)
+        return _Taken(raw, image, sent_s, acknowledged_s, time.monotonic(), missed)
 
     def _trigger(self, deadline_s: float) -> None:
         self._unanswered_trigger = True
@@ -189,6 +195,10 @@ class OpenCamera:
             self._fetch(deadline_s)
 
     def _fetch(self, deadline_s: float) -> RawFrame:
+        begun_s = time.monotonic()
+        if self._options.software_trigger:
+            patience_s = self.values.get("exposure_s", 0.0) + self._options.patience_s
+            deadline_s = min(deadline_s, begun_s + patience_s)
         while (left_s := deadline_s - time.monotonic()) > 0:
             raw = self._session.fetch(min(left_s, _SLICE_S))
             if raw is not None:
@@ -196,9 +206,13 @@ class OpenCamera:
                 return raw
             if self.lost:
                 raise DeviceUnreachable(f"{self._device}: the connection was lost; connect again")
-        raise FrameLost(
-            f"{self._device}: no frame came after the trigger; if this happens with every trigger, "
-            "no packet of this size may pass the network (MTU), or a firewall drops the stream"
+        raise FrameLost(f"no frame came within {time.monotonic() - begun_s:.2f} s")
+
+    def _lost_frame(self, missed: list[str], last: Exception) -> FrameLost:
+        tries = "; ".join([*missed, str(last)])
+        return FrameLost(
+            f"{self._device}: {tries}. If this happens with every trigger, no packet of this size "
+            "may pass the network (MTU), or a firewall drops the stream"
         )
 
     def _frame(self, taken: _Taken) -> Frame:
@@ -218,7 +232,7 @@ class OpenCamera:
                 "arrived_s": taken.arrived_s,
                 "device_timestamp_ns": ns,
                 "pixel_format": raw.pixel_format,
-                "incomplete": taken.incomplete,
+                "missed": taken.missed,
             },
         )
 
