@@ -197,7 +197,7 @@ class Sequencer:
         """A frame, and the arm's readings from before its trigger to after it came."""
         states = [self._arm.watch()]
         frame = self._arm.await_job(self._worker.do(partial(self._camera.grab, timeout_s)), states)
-        states.append(self._arm.watch())
+        states.append(self._arm.reading_after(frame.host_t_s))
         return frame, tuple(states)
 
     # -- checking and logging, while the arm goes on -----------------------------------------

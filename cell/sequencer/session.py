@@ -10,6 +10,7 @@ from typing import Any
 
 from cell.files.plan_file import Plan
 from cell.recording import FrameRecord, Header, RecordingWriter
+from cell.recording.corners import FILE_NAME as DETECTIONS
 from cell.sequencer.journal import Journal, check_same_plan, skipped_views
 from cell.sequencer.progress import Progress
 from cell.sequencer.sequencer import Devices, Listener, Sequencer
@@ -89,10 +90,18 @@ def _resume(plan: Plan, folder: Path, simulated: bool) -> Begun:
     writer, frames = RecordingWriter.resume(folder)
     done = {frame.frame for frame in frames}
     skipped = skipped_views(events)
+    _set_detections_aside(folder)
     todo = [i for i in range(len(plan.file.views)) if i not in done and i not in skipped]
     journal.write("resume", done=len(done), skipped=len(skipped), todo=len(todo))
     elapsed_s = _elapsed_s(events, frames, simulated)
     return writer, journal, Progress(deque(todo), done, skipped), elapsed_s
+
+
+def _set_detections_aside(folder: Path) -> None:
+    """Corners found before the run went on would stand for the whole of it."""
+    stale = folder / DETECTIONS
+    if stale.exists():
+        stale.replace(folder / f"{stale.stem}-before-resume{stale.suffix}")
 
 
 def _elapsed_s(

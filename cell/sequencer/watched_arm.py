@@ -19,6 +19,7 @@ from drivers.arm import Arm, ArmState, Motion
 from drivers.errors import ArmStopped, DeviceError, StopFailed
 
 POLL_S = 0.008
+READING_PATIENCE_S = 1.0
 STOP_ORDERS = 3
 _ARRIVED_RAD = 0.02
 _MOVE_PATIENCE = 3.0
@@ -78,6 +79,18 @@ class WatchedArm:
                 states.append(state)
             wait([job], timeout=POLL_S)
         return job.result()
+
+    def reading_after(self, host_t_s: float) -> ArmState:
+        """The first reading that is not older than that time; some controllers tell seldom.
+
+        After `READING_PATIENCE_S` without one the newest reading is returned as it is.
+        """
+        began_s = self.clock.now()
+        while True:
+            state = self.watch()
+            if state.host_t_s >= host_t_s or self.clock.now() - began_s > READING_PATIENCE_S:
+                return state
+            self.clock.sleep(POLL_S)
 
     def go(self, there: FloatArray, where: str) -> FloatArray:
         """Move to (6,) joint angles; returns those the move came from.

@@ -42,9 +42,15 @@ class FakeArm:
         self.fault: str | None = None
         self.stop_error: Exception | None = None
         self.drift_rad = 0.0
+        self.tells_every_s = 0.0
 
     def connect(self) -> None:
         self.calls.append("connect")
+
+    @property
+    def told_s(self) -> float:
+        every = self.tells_every_s
+        return self.now() // every * every if every else self.now()
 
     @property
     def share(self) -> float:
@@ -58,7 +64,7 @@ class FakeArm:
         joints = self.start + self.share * (self.end - self.start) + self.drift_rad
         motion = Motion.MOVING if self.moving else Motion.STEADY
         return ArmState(
-            host_t_s=self.now(),
+            host_t_s=self.told_s,
             controller_t_s=None,
             joints_rad=tuple(joints.tolist()),
             joint_velocity_rad_s=(0.0,) * 6,

@@ -217,6 +217,14 @@ def test_a_frame_older_than_the_standstill_is_refused(bench: Bench) -> None:
     assert "lies outside the time the arm stood still" in result.skipped[0]
 
 
+def test_an_arm_that_tells_its_pose_seldom_is_waited_for(bench: Bench) -> None:
+    bench.arm.tells_every_s = 0.2
+    assert bench.run().finish is Finish.COMPLETED
+    for frame in read_recording(bench.folder).frames:
+        clocks = (frame.model_extra or {})["clocks"]
+        assert abs(clocks["pose_host_s"] - clocks["frame_host_s"]) <= 0.2
+
+
 def test_poses_that_do_not_agree_are_refused(bench: Bench) -> None:
     grab = bench.camera.grab
 

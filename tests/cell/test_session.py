@@ -56,6 +56,15 @@ def test_a_run_can_be_stopped_and_gone_on_with(tmp_path: Path) -> None:
     assert "resume" in [event["event"] for event in read_journal(tmp_path / "run")]
 
 
+def test_corners_found_before_a_resume_do_not_stand_for_the_whole(tmp_path: Path) -> None:
+    plan = make_plan(tmp_path)
+    record_plan(plan, tmp_path / "run", devices())
+    (tmp_path / "run" / "detections.csv").write_text("frame,row,col,u_px,v_px\n")
+    record_plan(plan, tmp_path / "run", devices(), resume=True)
+    assert not read_recording(tmp_path / "run").has_detections
+    assert (tmp_path / "run" / "detections-before-resume.csv").exists()
+
+
 def test_a_changed_plan_is_not_gone_on_with(tmp_path: Path) -> None:
     record_plan(make_plan(tmp_path), tmp_path / "run", devices())
     changed = make_plan(tmp_path, PLAN.replace("0.2", "0.1"))
