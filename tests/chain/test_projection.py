@@ -1,0 +1,124 @@
+"""The projection against OpenCV's, and its derivatives against automatic differentiation."""
+
+from collections.abc import Callable
+
+import autograd
+import autograd.numpy as anp
+import cv2
+import numpy as np
+import pytest
+
+from calib.chain.optics import COLUMN, OPTICS, optics_row
+from calib.chain.projection import project, project_with_jacobians
+from calib.chain.rigid import compose, from_vector
+from calib.views import FloatArray
+from tests.chain import independent
+
+OPENCV = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4")
+RNG = np.random.default_rng(4)
+POINTS = np.column_stack([RNG.uniform(-0.15, 0.15, (12, 2)), RNG.uniform(-0.02, 0.02, 12)])
+POSES = compose(RNG.normal(0, 0.4, (3, 3)), np.array([[0, 0, 0.5], [0.05, 0, 0.4], [0, 0.1, 0.9]]))
+SWEEP = [name for name in OPTICS if name.startswith("sweep")]
+DIFFERENTIABLE = [n for n in OPTICS if n != "height_px" and n not in SWEEP]
+
+
+def _lens(**more: float) -> FloatArray:
+    brown = {
+        name: float(value) for name, value in zip(OPENCV, RNG.normal(0, 0.02, 12), strict=True)
+    }
+    ideal = {"alpha_px": 2400.0, "beta_px": 2380.0, "u0_px": 1010.0, "v0_px": 770.0}
+    return optics_row(**ideal, **brown, height_px=1500.0, **more)
+
+
+def _repeated(row: FloatArray) -> FloatArray:
+    return np.repeat(row[None], len(POSES), axis=0)
+
+
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.03, -0.02), (-0.2, 0.15)])
+def test_all_fourteen_coefficients_do_what_opencv_s_do(tilt: tuple[float, float]) -> None:
+    row = _lens(tilt_x_rad=tilt[0], tilt_y_rad=tilt[1])
+    A = np.array([[row[0], 0, row[3]], [0, row[1], row[4]], [0, 0, 1]])
+    coefficients = np.array([*(row[COLUMN[name]] for name in OPENCV), *tilt])
+    found = project(_repeated(row), POSES, POINTS)
+    for pose, seen in zip(POSES, found, strict=True):
+        rotation = cv2.Rodrigues(pose[:3, :3])[0]
+        expected, _ = cv2.projectPoints(POINTS, rotation, pose[:3, 3], A, coefficients)
+        assert np.abs(seen - expected[:, 0]).max() < 1e-9
+
+
+def test_skew_leans_the_rows() -> None:
+    plain, skewed = _lens(), _lens(skew_px=0.0)
+    skewed[COLUMN["skew_px"]] = 3.0
+    skewed[5:21], plain[5:21] = 0.0, 0.0
+    before = project(_repeated(plain), POSES, POINTS)
+    after = project(_repeated(skewed), POSES, POINTS)
+    y = (before[..., 1] - plain[COLUMN["v0_px"]]) / plain[COLUMN["beta_px"]]
+    assert np.allclose(after[..., 0] - before[..., 0], 3.0 * y, atol=1e-9)
+
+
+def _independent(row: FloatArray, pose: FloatArray, point: FloatArray) -> Callable[..., object]:
+    """Pixel as a function of (21,) optics and a (6,) increment on the camera's side."""
+
+    def function(values: object, increment: object) -> object:
+        o = dict(zip(DIFFERENTIABLE, values, strict=True))  # type: ignore[call-overload]
+        before = anp.array(pose[:3, :3] @ point + pose[:3, 3])
+        moved = independent.camera_coordinates(independent.rigid(increment), before)
+        return independent.pixel(o, moved)
+
+    return function
+
+
+LENSES = {
+    "all zero": optics_row(alpha_px=900.0, beta_px=910.0, height_px=700.0),
+    "opencv": _lens(skew_px=2.0),
+    "tilted": _lens(tilt_x_rad=0.05, tilt_y_rad=-0.08),
+    "everything": _lens(
+        skew_px=1.0, tilt_x_rad=0.02, tilt_y_rad=0.03, pupil_m_rad2=0.01, window_m=0.004
+    ),
+}
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_every_derivative_is_that_of_automatic_differentiation(lens: str) -> None:
+    row = LENSES[lens]
+    values = np.array([row[COLUMN[name]] for name in DIFFERENTIABLE])
+    columns = [COLUMN[name] for name in DIFFERENTIABLE]
+    uv, j_pose, j_optics = project_with_jacobians(_repeated(row), POSES, POINTS)
+    assert np.array_equal(uv, project(_repeated(row), POSES, POINTS))
+    for i, pose in enumerate(POSES):
+        for j, point in enumerate(POINTS):
+            function = _independent(row, pose, point)
+            assert np.allclose(function(values, np.zeros(6)), uv[i, j], rtol=0, atol=1e-9)
+            by_optics = autograd.jacobian(function, 0)(values, np.zeros(6))
+            by_pose = autograd.jacobian(function, 1)(values, np.zeros(6))
+            assert np.allclose(j_optics[i, j][:, columns], by_optics, rtol=1e-7, atol=1e-5)
+            assert np.allclose(j_pose[i, j], by_pose, rtol=1e-9, atol=1e-7)
+    assert np.all(j_optics[..., COLUMN["height_px"]] == 0.0)
+
+
+def test_a_rolling_shutter_moves_a_corner_as_far_as_its_row_is_late() -> None:
+    row = _lens()
+    still, j_pose, _ = project_with_jacobians(_repeated(row), POSES, POINTS)
+    sweep = np.array([0.002, -0.001, 0.003, 0.004, 0.001, -0.002])
+    row[[COLUMN[name] for name in SWEEP]] = sweep
+    moved, _, j_optics = project_with_jacobians(_repeated(row), POSES, POINTS)
+    late = still[..., 1] / 1500.0 - 0.5
+    assert np.allclose(moved - still, late[..., None] * (j_pose @ sweep), atol=1e-9)
+    for k, name in enumerate(SWEEP):
+        expected = j_pose[..., k] * late[..., None]
+        assert np.allclose(j_optics[..., COLUMN[name]], expected, atol=1e-9)
+
+
+def test_the_sweep_is_the_first_order_of_the_pose_at_the_row_s_time() -> None:
+    row = _lens()
+    sweep = np.array([2e-5, -1e-5, 3e-5, 4e-5, 1e-5, -2e-5])
+    row[[COLUMN[name] for name in SWEEP]] = sweep
+    swept = project(_repeated(row), POSES, POINTS)
+    row[[COLUMN[name] for name in SWEEP]] = 0.0
+    still = project(_repeated(row), POSES, POINTS)
+    for i, pose in enumerate(POSES):
+        for j, point in enumerate(POINTS):
+            late = still[i, j, 1] / 1500.0 - 0.5
+            there = from_vector(sweep * late) @ pose
+            true = project(row[None], there[None], point[None])[0, 0]
+            assert np.abs(swept[i, j] - true).max() < 1e-3 * np.abs(true - still[i, j]).max() + 1e-9
