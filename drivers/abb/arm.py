@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+
 from drivers.abb.egm import EgmReader
 from drivers.abb.readings import Reading, world_from_base
 from drivers.abb.rws import named
@@ -46,11 +48,12 @@ class ABBArm:
             Not in automatic mode, motors off, or stopped for safety.
         """
         self.close()
+        atexit.register(self.close)
         warn_untried(f"ABB arm at {self._url}", "a simulated IRC5 on loopback")
         supervisor = Supervisor(self._url, self._settings)
         try:
             self._open(supervisor)
-        except Exception:
+        except BaseException:
             supervisor.close()
             self.close()
             raise
@@ -103,6 +106,7 @@ class ABBArm:
 
     def close(self) -> None:
         """Stop and let go of the controller. Idempotent."""
+        atexit.unregister(self.close)
         if self._supervisor is not None:
             self._supervisor.close()
             self._supervisor = None
@@ -132,7 +136,8 @@ class ABBArm:
         if supervisor.newest is None or supervisor.silent_s > self._settings.silence_s:
             raise DeviceUnreachable(
                 self._named(
-                    f"no robot state for {supervisor.silent_s:.1f} s. The arm was told to stop. "
+                    f"no robot state for {supervisor.silent_s:.1f} s. The arm was told to stop, "
+                    "which nobody confirms: look at it, and press the emergency stop if it moves. "
                     "Check the network and the controller, then connect again"
                 )
             )

@@ -22,6 +22,7 @@ from drivers.errors import DeviceUnreachable
 _GUARD = Path(__file__).with_name("guard.py")
 _ANSWER_S = 0.04
 _GUARD_START_S = 10.0
+_CLOSE_S = 1.0
 
 
 class Stopper:
@@ -69,20 +70,20 @@ class Stopper:
         self._await_guard(self._guard)
         self._thread.start()
 
-    def order(self) -> None:
-        """Send the stop on both ways and wait briefly for an answer; `failure` tells of it."""
+    def order(self) -> bool:
+        """Send the stop on both ways; return whether the answer came at once, see `failure`."""
         self.failure = None
         self._answered.clear()
         self._tell_guard("stop")
         self._asked.set()
-        self._answered.wait(_ANSWER_S)
+        return self._answered.wait(_ANSWER_S)
 
     def close(self) -> None:
         """Stop the arm and end the guard."""
         self._closing = True
         self._asked.set()
         if self._thread.is_alive():
-            self._thread.join(timeout=5.0)
+            self._thread.join(timeout=_CLOSE_S)
         if self._guard is not None:
             self._end_guard(self._guard)
 
@@ -118,8 +119,6 @@ class Stopper:
             if pipe is not None:
                 with contextlib.suppress(OSError):
                     pipe.close()
-        try:
-            guard.wait(timeout=5.0)
-        except subprocess.TimeoutExpired:
-            guard.kill()
-            guard.wait()
+        # one that takes longer is still trying to stop the arm, and ends by itself
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            guard.wait(timeout=_CLOSE_S)

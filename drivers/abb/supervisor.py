@@ -32,6 +32,7 @@ from drivers.errors import DeviceError, DeviceUnreachable
 _AT_REST_RAD = 1e-4
 _PANEL_EVERY, _POSE_EVERY = 7, 4
 _STOP_CONFIRM_S = 2.0
+_CLOSE_S = 1.0
 _START_S = 0.5  # between the answer to a start and the motion
 _START_ACTION = "rapid/execution?action=start"
 
@@ -107,11 +108,13 @@ class Supervisor:
     def stop(self) -> str | None:
         """Stop the arm; return why the stop was not taken, or None."""
         self._cancelled.set()
-        self._stopper.order()
+        answered = self._stopper.order()
         with self._lock:
             self._order = None
             self._stop_s = time.monotonic()
         self._wake.set()
+        if not answered and self.silent_s > self._settings.silence_s:
+            return "the controller is silent"
         return self._stopper.failure
 
     def close(self) -> None:
@@ -121,7 +124,7 @@ class Supervisor:
         self._wake.set()
         self._stopper.close()
         if self._thread.is_alive():
-            self._thread.join(timeout=5.0)
+            self._thread.join(timeout=_CLOSE_S)
 
     def _check_cancelled(self, method: str, address: str) -> None:
         if _START_ACTION in address and (self._cancelled.is_set() or self._closing):

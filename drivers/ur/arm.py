@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import time
 from typing import Any
@@ -69,12 +70,13 @@ class URArm:
             Powered off, or stopped for safety.
         """
         self.close()
+        atexit.register(self.close)
         warn_untried(f"Universal Robots arm at {self._host}", "a simulated controller on loopback")
-        self._identify()
-        self._reader.connect()
         try:
+            self._identify()
+            self._reader.connect()
             self._start()
-        except Exception:
+        except BaseException:
             self.close()
             raise
 
@@ -154,6 +156,7 @@ class URArm:
 
     def close(self) -> None:
         """Stop and let go of the controller. Idempotent."""
+        atexit.unregister(self.close)
         if self._supervisor is not None:
             self._supervisor.close()
             self._supervisor = None

@@ -111,7 +111,8 @@ class RtdeReader:
         if lost is not None or self._newest is None:
             raise DeviceUnreachable(
                 f"UR controller {self._host}: no robot state ({lost or 'nothing received'}). The "
-                "arm was told to stop. Check the network and the controller, then connect again"
+                "arm was told to stop, and its own watchdog stops it: look whether it stands. "
+                "Check the network and the controller, then connect again"
             )
         return self._newest
 

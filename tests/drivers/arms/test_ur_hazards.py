@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from subprocess import DEVNULL, PIPE
 
 import numpy as np
 import pytest
@@ -229,14 +230,18 @@ time.sleep(60)
 
 @pytest.mark.parametrize(
     ("ending", "goal_s"),
-    [(signal.SIGKILL, GOAL_S + WATCHDOG_S), (signal.SIGSTOP, 0.5 + GOAL_S + WATCHDOG_S)],
-    ids=["killed", "frozen"],
+    [
+        (signal.SIGINT, GOAL_S),
+        (signal.SIGKILL, GOAL_S + WATCHDOG_S),
+        (signal.SIGSTOP, 0.5 + GOAL_S + WATCHDOG_S),
+    ],
+    ids=["interrupted", "killed", "frozen"],
 )
 def test_the_arm_stops_when_our_process_is_gone_on_the_way(ending, goal_s):
     def measure():
         with ur_peer() as (controller, sim):
             command = [sys.executable, "-c", _MOVE_AND_WAIT, controller.address, *map(str, UR_FAR)]
-            with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+            with subprocess.Popen(command, stdout=PIPE, stderr=DEVNULL) as process:
                 assert process.stdout.readline() == b"moving\n"
                 assert until(lambda: truly_moving(sim))
                 since_s = time.monotonic()
