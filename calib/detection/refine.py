@@ -239,15 +239,13 @@ def fit_closely(
 ) -> Fitted:
     """The last word on a grid: starts refined if `rough`, then the fit with all that bends.
 
-    Where the blur mixes neighbouring corners the fit is repeated with what the first said of
-    the neighbours.
+    Where the blur mixes neighbouring corners, a first fit tells more of the neighbours.
     """
     if rough:
         first = fit_grid(image, first, clear=clear, iterations=2).parameters
-    fitted = fit_grid(image, first, bent=True, clear=clear)
-    if _blur_share(fitted.parameters) > _MIXING_BLUR:
-        fitted = fit_grid(image, fitted.parameters, bent=True, clear=clear)
-    return fitted
+    if _blur_share(first) > _MIXING_BLUR:
+        first = fit_grid(image, first, bent=True, clear=clear, iterations=2).parameters
+    return fit_grid(image, first, bent=True, clear=clear)
 
 
 def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray[np.bool_]:
@@ -260,6 +258,8 @@ def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray
     first_dark:
         Whether the square outside corner (0, 0) is dark.
     """
+    if not np.isfinite(fitted.residual).any():
+        return np.ones(fitted.residual.shape, dtype=np.bool_)
     shortest = _shortest_step(lattice_steps(before_px))
     moved = np.linalg.norm(fitted.corners_px - before_px, axis=-1)
     contrast = fitted.first_dark_contrast * (1.0 if first_dark else -1.0)
@@ -268,7 +268,7 @@ def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray
         np.isfinite(fitted.residual)
         & (moved < 0.3 * shortest)
         & (contrast > 0.2 * typical)
-        & (contrast < 2.0 * typical)
-        & (fitted.residual < 0.12 * typical + 2.5 * float(np.nanmedian(fitted.residual)))
+        & (contrast < 1.5 * typical)
+        & (fitted.residual < 0.25 * typical + 2.5 * float(np.nanmedian(fitted.residual)))
     )
     return np.asarray(~fine)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ class Rejected:
 
     reason: str
 
-    def __bool__(self) -> bool:
+    def __bool__(self) -> Literal[False]:
         return False
 
 
@@ -56,6 +57,9 @@ class Detection:
     contrast: FloatArray
     upside_down_known: bool
     saturated: float
+
+    def __bool__(self) -> Literal[True]:
+        return True
 
     @property
     def frame_blur_px(self) -> float:

@@ -241,9 +241,9 @@ def _gather(
                 continue
             if count == pixels.shape[0]:
                 return count
-            pixels[count, 6] = _neighbour_slants(ix, iy, p, lines)
-            add1, left1 = _neighbour_edges(ix, iy, p[WIDTH], lines, 0)
-            add2, left2 = _neighbour_edges(ix, iy, p[WIDTH], lines, 2)
+            pixels[count, 6] = _neighbour_slants(float(ix), float(iy), p, lines)
+            add1, left1 = _neighbour_edges(float(ix), float(iy), p[WIDTH], lines, 0)
+            add2, left2 = _neighbour_edges(float(ix), float(iy), p[WIDTH], lines, 2)
             pixels[count, 0], pixels[count, 1], pixels[count, 2] = ix, iy, image[iy, ix]
             pixels[count, 3], pixels[count, 4], pixels[count, 5] = add1, add2, left1 * left2
             count += 1
@@ -313,12 +313,16 @@ def _minimise(p: Any, pixels: Any, count: int, shape: Any, A: Any, iterations: i
     for _ in range(iterations):
         if not _solve_damped(A, g, damping, step):
             return -1.0
-        trial[:] = p + step
+        for k in range(PARAMETERS):
+            trial[k] = p[k] + step[k]
         trial[WIDTH] = min(max(trial[WIDTH], 0.5 * p[WIDTH], 0.29), 2.0 * p[WIDTH])
         new = _normal_equations(trial, pixels, count, shape, A_trial, g_trial)
         moved = abs(step[X]) + abs(step[Y])
         if new <= cost:
-            p[:], A[:], g[:] = trial, A_trial, g_trial
+            for k in range(PARAMETERS):
+                p[k], g[k] = trial[k], g_trial[k]
+                for m in range(k + 1):
+                    A[k, m] = A_trial[k, m]
             cost, damping = new, damping * 0.1
             if moved < _CONVERGED_PX:
                 break
@@ -349,7 +353,7 @@ def _fit(
     pixels = np.empty((int((4.0 * reach_px + 8.0) ** 2), 7))
     for i in range(M):
         p = fitted[i]
-        if not (np.isfinite(p).all() and np.isfinite(steps[i]).all()):
+        if not math.isfinite(p.sum() + steps[i].sum()):
             continue
         longest = max(math.hypot(steps[i, 0], steps[i, 1]), math.hypot(steps[i, 2], steps[i, 3]))
         count = _gather(image, p, steps[i], lines[i], min(reach, reach_px / longest), clear, pixels)
