@@ -83,7 +83,7 @@ def _told(books: Books, held: BoolArray, before: JointFit, leftover: Leftover) -
     search = leftover.search
     after = search.best.fit
     everything = Fitter(books.views, books.has_robot)
-    twin = everything.with_effects(_restarted(after, len(books.views), held), after.model.effects)
+    twin = everything.settled(_restarted(after, len(books.views), held))
     plain = everything.fit(before.model, before.noise)
     fits = _Fits(before, after, twin, plain)
     held_views = books.views.take(held)

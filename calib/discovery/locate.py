@@ -26,7 +26,7 @@ from calib.chain.walk import Walk
 from calib.discovery.fields import field_scores
 from calib.discovery.score import Score, conditional, extended, group_score
 from calib.solver.joint import JointFit, assemble
-from calib.solver.unknowns import Dependence
+from calib.solver.unknowns import Dependence, amounts, prior_information
 from calib.views import FloatArray, Views
 
 _PERIODS = 240
@@ -87,6 +87,8 @@ class _Probe:
         constant = Covariate("constant", "1", lambda w: np.ones((len(w.views), 1)))
         presents = [present_curve(Curve(s, constant, 0.0, 1.0), state) for s in self.sites]
         _, self.found, unknowns, self.base = extended(fit, views, presents)
+        self.amount = amounts(fit.model, fit.unknowns)
+        self.information = prior_information(fit.unknowns)
         first = len(fit.model.effects)
         self.owner = np.array([u.place[1] - first for u in unknowns[self.base :]])
 
@@ -100,7 +102,11 @@ class _Probe:
             self.found.state, self.found.active, self.found.modes, local, self.found.flange
         )
         shift = self.fit.equations.corner_shift if self.fit.equations.corner_numbers else None
-        equations, _ = assemble(found, self.views, self.fit.weight, self.fit.flange_error, shift)
+        free = np.zeros(local.shape[2] - self.base)
+        prior = (np.append(self.amount, free), np.append(self.information, free))
+        equations, _ = assemble(
+            found, self.views, self.fit.weight, self.fit.flange_error, shift, prior
+        )
         b = functions.shape[1]
         information, score = conditional(equations, self.fit, self.base + np.arange(b * e))
         owner = np.tile(self.owner, b)

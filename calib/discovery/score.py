@@ -19,7 +19,14 @@ from calib.chain.model import kinematics_of
 from calib.solver.elimination import solve_scaled
 from calib.solver.joint import JointFit, assemble
 from calib.solver.noise import JointEquations, scaled
-from calib.solver.unknowns import Dependence, Unknown, dependence, unknowns_of
+from calib.solver.unknowns import (
+    Dependence,
+    Unknown,
+    dependence,
+    prior_information,
+    unknowns_of,
+)
+from calib.solver.unknowns import amounts as amounts_of
 from calib.views import FloatArray, Views
 
 
@@ -108,7 +115,8 @@ def extended(
         model, views, unknowns, kinematics=kinematics_of(views), flange_error=fit.flange_error
     )
     shift = fit.equations.corner_shift if fit.equations.corner_numbers else None
-    equations, _ = assemble(found, views, fit.weight, fit.flange_error, shift)
+    prior = (amounts_of(model, unknowns), prior_information(unknowns))
+    equations, _ = assemble(found, views, fit.weight, fit.flange_error, shift, prior)
     return equations, found, unknowns, base
 
 

@@ -113,14 +113,19 @@ class Search:
             return False
         rivals = tuple((c.present, t.criterion - trial.criterion) for c, t in trials[1:])
         self.steps.append(Step(candidate.present, trial, demand, rivals))
-        self.best = trial
+        self._settle(trial.fit, candidate.choices)
         return True
+
+    def _settle(self, fit: JointFit, choices: int = 1) -> None:
+        """Weigh the corners anew under the model taken, for the next contest."""
+        settled = self.fitter.settled(fit)
+        self.best = Trial(settled, criterion(settled, self.views, choices))
 
     def force(self, effects: Sequence[Present]) -> JointFit:
         """Take exactly these effects, whatever the data say."""
         fit = self.fitter.with_effects(self.best.fit, effects)
-        self.best = Trial(fit, criterion(fit, self.views))
-        return fit
+        self._settle(fit)
+        return self.best.fit
 
     def put_in(self, present: Present, choices: int = 1) -> bool:
         """Put an effect in without a contest; False where it does not lower the criterion."""
@@ -129,7 +134,7 @@ class Search:
         value = criterion(tried, self.views, choices)
         if value > self.best.criterion:
             return False
-        self.best = Trial(tried, value)
+        self._settle(tried, choices)
         return True
 
     def _drop(self) -> bool:
@@ -143,7 +148,7 @@ class Search:
             tried = self.fitter.with_effects(fit, rest)
             value = criterion(tried, self.views)
             if value < self.best.criterion + DEMAND:
-                self.best = Trial(tried, value)
+                self._settle(tried)
                 self.steps = [s for s in self.steps if s.taken.effect != effects[index].effect]
                 return True
         return False

@@ -89,21 +89,38 @@ class Fitter:
     has_robot: bool = True
 
     def fit(
-        self, model: CellModel, noise: Noise, flange_error: FloatArray | None = None
+        self,
+        model: CellModel,
+        noise: Noise,
+        flange_error: FloatArray | None = None,
+        weight: FloatArray | None = None,
     ) -> JointFit:
-        """Fit the cell, with whatever effects it has."""
+        """Fit the cell, with whatever effects it has; the corners' weights too if not given."""
         if self.has_robot:
             unknowns = unknowns_of(model)
-            return fit_joint(model, self.views, unknowns, noise, flange_error=flange_error)
+            return fit_joint(
+                model, self.views, unknowns, noise, flange_error=flange_error, weight=weight
+            )
         unheard = replace(noise, flange_m=UNKNOWN_POSE[0], flange_rad=UNKNOWN_POSE[1])
         unknowns = unknowns_of(model, poses=False)
         return fit_joint(
-            model, self.views, unknowns, unheard, flange_error=flange_error, fixed_noise=True
+            model,
+            self.views,
+            unknowns,
+            unheard,
+            flange_error=flange_error,
+            fixed_noise=True,
+            weight=weight,
         )
 
     def with_effects(self, start: JointFit, effects: Sequence[Present]) -> JointFit:
-        """Fit a cell with these effects, from where another fit stands."""
-        return self.fit(start.model.with_effects(effects), start.noise, start.flange_error)
+        """Fit a cell with these effects from where another fit stands, corners weighted alike."""
+        model = start.model.with_effects(effects)
+        return self.fit(model, start.noise, start.flange_error, start.weight)
+
+    def settled(self, start: JointFit) -> JointFit:
+        """Fit the same cell with the corners' weights estimated anew."""
+        return self.fit(start.model, start.noise, start.flange_error)
 
 
 _PRINT_WORTH = 10.0
@@ -136,5 +153,7 @@ def fit_start(fitter: Fitter, free: FreeViews, train: BoolArray) -> JointFit:
     fit = fitter.fit(model, noise)
     if not fitter.has_robot or views.board.corner_count > _MOST_FREE_CORNERS:
         return fit
-    freed = fitter.fit(fit.model, replace(fit.noise, print_m=_PRINT_GUESS_M), fit.flange_error)
-    return freed if freed.minus_two_log < fit.minus_two_log - _PRINT_WORTH else fit
+    guess = replace(fit.noise, print_m=_PRINT_GUESS_M)
+    freed = fitter.fit(fit.model, guess, fit.flange_error, fit.weight)
+    better = freed.minus_two_log < fit.minus_two_log - _PRINT_WORTH
+    return fitter.settled(freed) if better else fit

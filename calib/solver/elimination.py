@@ -15,6 +15,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 from calib.views import FloatArray
 
+UNDETERMINED = 1e-10
+"""Relative eigenvalue below which a direction is what rounding in the derivatives made it."""
+
 
 @dataclass(frozen=True)
 class FrameEquations:
@@ -105,7 +108,7 @@ def solve_scaled(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, Flo
     Returns
     -------
     The solution, the inverse of the matrix, and its log-determinant. Directions that the data do
-    not determine (relative eigenvalue below 1e-13) are left where they are.
+    not determine (relative eigenvalue below `UNDETERMINED`) are left where they are.
     """
     if matrix.size == 0:  # only the frames' own numbers are free
         return right.copy(), matrix.copy(), 0.0
@@ -114,7 +117,7 @@ def solve_scaled(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, Flo
     normal = matrix * scale[:, None] * scale[None, :]
     try:
         factor = cho_factor(normal, lower=True)
-        if np.diag(factor[0]).min() > 1e-6:
+        if np.diag(factor[0]).min() ** 2 > UNDETERMINED:
             inverse = cho_solve(factor, np.eye(len(normal)))
             log_det = 2.0 * float(np.sum(np.log(np.diag(factor[0]))) - np.sum(np.log(scale)))
             inverse = inverse * scale[:, None] * scale[None, :]
@@ -122,7 +125,7 @@ def solve_scaled(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, Flo
     except np.linalg.LinAlgError:
         pass
     eigenvalue, vector = np.linalg.eigh(normal)
-    kept = eigenvalue > 1e-13 * max(float(eigenvalue[-1]), 1e-300)
+    kept = eigenvalue > UNDETERMINED * max(float(eigenvalue[-1]), 1e-300)
     root = (vector[:, kept] / np.sqrt(eigenvalue[kept])) * scale[:, None]
     inverse = root @ root.T
     log_det = float(np.sum(np.log(eigenvalue[kept])))

@@ -13,7 +13,14 @@ from calib.chain.projection import project
 from calib.solver.accumulate import LocalEquations, local_equations
 from calib.solver.elimination import FrameEquations, solve_scaled
 from calib.solver.noise import JointEquations, Noise, Profile, estimate_noise, profile, scaled
-from calib.solver.unknowns import Dependence, Unknown, dependence, moved
+from calib.solver.unknowns import (
+    Dependence,
+    Unknown,
+    amounts,
+    dependence,
+    moved,
+    prior_information,
+)
 from calib.views import FloatArray, Views
 
 GOOD_SIGMA = 3.0
@@ -110,8 +117,12 @@ def assemble(
     weight: FloatArray,
     flange_error: FloatArray,
     corner_shift: FloatArray | None,
+    prior: tuple[FloatArray, FloatArray],
 ) -> tuple[JointEquations, FloatArray]:
-    """Normal equations in flange errors and shared numbers; and (N, M, 2) residuals."""
+    """Normal equations in flange errors and shared numbers; and (N, M, 2) residuals.
+
+    `prior` has where the p shared numbers stand and the inverse variances of their priors.
+    """
     state = found.state
     local = local_equations(
         state.optics,
@@ -142,6 +153,8 @@ def assemble(
         frames=frames,
         flange_error=flange_error,
         corner_shift=np.zeros(0) if corner_shift is None else corner_shift,
+        amount=prior[0],
+        amount_information=prior[1],
         corner_numbers=0 if corner_shift is None else len(corner_shift),
         observations=2 * int((weight > 0.0).sum()),
     )
@@ -168,11 +181,14 @@ class _Iteration:
         views: Views,
         unknowns: tuple[Unknown, ...],
         arm: ArmKinematics | None,
+        weight: FloatArray | None,
     ) -> None:
         self.views, self.unknowns, self.arm = views, unknowns, arm
+        self.information = prior_information(unknowns)
         self.state = state
         self.with_print = state.noise.print_m > 0.0
-        self.weight = views.seen.astype(np.float64)
+        self.robust = weight is None
+        self.weight = views.seen.astype(np.float64) if weight is None else weight
         self.damping = 1e-6
         self.linearise()
 
@@ -188,7 +204,8 @@ class _Iteration:
 
     def _assemble(self, found: Dependence, at: JointState) -> tuple[JointEquations, FloatArray]:
         shift = _shift_of(at.model, self.views) if self.with_print else None
-        return assemble(found, self.views, self.weight, at.flange_error, shift)
+        prior = (amounts(at.model, self.unknowns), self.information)
+        return assemble(found, self.views, self.weight, at.flange_error, shift, prior)
 
     def cost(self, at: JointState) -> float:
         """Penalised square sum at that state, for the present weights."""
@@ -198,6 +215,7 @@ class _Iteration:
         cost = float(np.sum(self.weight * square)) / at.noise.corner_px**2
         pull = at.flange_error @ at.noise.flange_information
         cost += float(np.sum(pull * at.flange_error))
+        cost += float(np.sum(amounts(at.model, self.unknowns) ** 2 * self.information))
         if self.with_print:
             cost += float(np.sum(_shift_of(at.model, self.views) ** 2)) / at.noise.print_m**2
         return cost
@@ -229,12 +247,12 @@ class _Iteration:
         error = rigid.to_vector(rigid.from_vector(self.state.flange_error) @ rigid.from_vector(own))
         return replace(self.state, model=model, flange_error=error)
 
-    def refresh(self, *, noise: bool, robust: bool) -> None:
-        """Estimate the noise anew, and the corners' weights."""
+    def refresh(self, *, noise: bool) -> None:
+        """Estimate the noise anew, and the corners' weights unless they are given."""
         if noise:
             level, _ = estimate_noise(self.equations, self.state.noise)
             self.state = replace(self.state, noise=level)
-        if robust:
+        if self.robust:
             self.weight = _robust_weight(self.residual, self.state.noise.corner_px)
             self.equations, self.residual = self._assemble(self.found, self.state)
 
@@ -260,6 +278,7 @@ def fit_joint(
     flange_error: FloatArray | None = None,
     rounds: int = 3,
     fixed_noise: bool = False,
+    weight: FloatArray | None = None,
     kinematics: ArmKinematics | None = None,
 ) -> JointFit:
     """Fit the free numbers of a cell, each flange's error, and the noise levels.
@@ -279,6 +298,9 @@ def fit_joint(
         How often noise and weights are estimated anew.
     fixed_noise:
         Keep the noise levels as given.
+    weight:
+        (N, M) what each corner counts, kept as it is: likelihoods of models are comparable only
+        for the same weights. Estimated robustly where None.
 
     Raises
     ------
@@ -289,7 +311,7 @@ def fit_joint(
         raise ValueError("every frame of a joint fit needs base_from_flange")
     error = np.zeros((len(views), 6)) if flange_error is None else flange_error
     arm = kinematics or kinematics_of(views)
-    run = _Iteration(JointState(model, error, noise), views, unknowns, arm)
+    run = _Iteration(JointState(model, error, noise), views, unknowns, arm, weight)
     settled = False
     for attempt in range(rounds):
         settled = False
@@ -298,7 +320,7 @@ def fit_joint(
             if settled:
                 break
         if attempt < rounds - 1 or not fixed_noise:
-            run.refresh(noise=not fixed_noise, robust=True)
+            run.refresh(noise=not fixed_noise)
     run.step()
     return _result(run, settled)
 

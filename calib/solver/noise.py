@@ -58,8 +58,10 @@ class JointEquations:
     frames:
         Equations in the flange's six numbers and the shared ones; the last `corner_numbers` of
         the shared ones are shifts of single corners.
-    flange_error, corner_shift:
-        (N, 6) and (C,) where the unknowns with a prior stand now.
+    flange_error, corner_shift, amount:
+        (N, 6), (C,) and (p,) where the unknowns with a prior stand now.
+    amount_information:
+        (p,) inverse variances of the amounts' priors.
     corner_numbers, observations:
         C and the number of scalar observations.
     """
@@ -67,6 +69,8 @@ class JointEquations:
     frames: FrameEquations
     flange_error: FloatArray
     corner_shift: FloatArray
+    amount: FloatArray
+    amount_information: FloatArray
     corner_numbers: int
     observations: int
 
@@ -100,18 +104,14 @@ def scaled(
     """Equations with noise levels and priors put in, frames eliminated; and the shared prior."""
     frames, information = equations.frames, noise.corner_px**-2.0
     prior = noise.flange_information
-    p_all = len(frames.shared_residual)
-    shared_prior = np.zeros(p_all)
-    c = equations.corner_numbers
-    if c:
-        shared_prior[-c:] = noise.print_m**-2.0
+    shared_at = np.concatenate([equations.amount, equations.corner_shift])
+    print_information = noise.print_m**-2.0 if equations.corner_numbers else 0.0
+    shared_prior = np.concatenate(
+        [equations.amount_information, np.full(equations.corner_numbers, print_information)]
+    )
     pull = equations.flange_error @ prior
-    shared_pull = np.zeros(p_all)
-    if c:
-        shared_pull[-c:] = shared_prior[-c:] * equations.corner_shift
-    square = float(np.sum(equations.flange_error * pull))
-    if c:
-        square += float(shared_pull[-c:] @ equations.corner_shift)
+    shared_pull = shared_prior * shared_at
+    square = float(np.sum(equations.flange_error * pull)) + float(shared_pull @ shared_at)
     weighted = FrameEquations(
         own=frames.own * information,
         own_shared=frames.own_shared * information,

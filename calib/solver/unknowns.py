@@ -20,19 +20,34 @@ PLAIN_OPTICS = ("alpha_px", "beta_px", "u0_px", "v0_px", "k1", "k2")
 """What the plain model frees: one focal length a side, principal point, two radial terms."""
 
 
+PRIOR_WIDTH = 10.0
+"""An effect's amount has a normal prior this many times its usual size wide.
+
+Wide enough to leave every real size alone; without it two effects that are each other's mirror
+image (all lengths of the arm, the board's scale) run off together to wherever noise is cheapest.
+"""
+
+
 @dataclass(frozen=True)
 class Unknown:
-    """One free number: where it stands, its usual size, and its unit."""
+    """One free number: where it stands, its usual size, its unit, and how wide its prior is."""
 
     name: str
     unit: str
     typical: float
     place: tuple[str, int, int]
+    prior_sigma: float = np.inf
 
 
 def _free_of(effect: Effect, at: int) -> list[Unknown]:
     return [
-        Unknown(f"{effect.label}.{p.name}", p.unit, p.typical, ("effect", at, k))
+        Unknown(
+            f"{effect.label}.{p.name}",
+            p.unit,
+            p.typical,
+            ("effect", at, k),
+            PRIOR_WIDTH * p.typical if p.role == "amount" else np.inf,
+        )
         for k, p in enumerate(effect.parameters)
         if p.role != "setting" and p.identifiable
     ]
@@ -73,6 +88,21 @@ def moved(model: CellModel, unknowns: tuple[Unknown, ...], step: FloatArray) -> 
         if increment.any()
     }
     return replace(model, optics=optics, effects=tuple(effects), **changed)
+
+
+def amounts(model: CellModel, unknowns: tuple[Unknown, ...]) -> FloatArray:
+    """(p,) present values of the numbers that have a prior; zero for the others."""
+    return np.array(
+        [
+            float(model.effects[u.place[1]].values[u.place[2]]) if u.place[0] == "effect" else 0.0
+            for u in unknowns
+        ]
+    )
+
+
+def prior_information(unknowns: tuple[Unknown, ...]) -> FloatArray:
+    """(p,) inverse variances of the priors, all centred on zero."""
+    return np.array([u.prior_sigma**-2.0 for u in unknowns])
 
 
 def _nudged(present: Present, k: int, amount: float) -> Present:
