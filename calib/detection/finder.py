@@ -75,7 +75,10 @@ def _on_level(image: FloatImage, board: Board) -> tuple[Grid, Fitted] | Rejected
                 return grid, fitted
             most = max(most, seen)
     if most:
-        return Rejected(f"{_PARTIAL}: {most} of {board.corner_count} corners are there")
+        return Rejected(
+            f"{_PARTIAL}: {most} of {board.corner_count} corners are clear, the others lie "
+            "outside the picture, are covered or burnt out"
+        )
     return reasons[1] if len(reasons) > 1 else reasons[0]
 
 

@@ -269,6 +269,6 @@ def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray
         & (moved < 0.3 * shortest)
         & (contrast > 0.2 * typical)
         & (contrast < 1.5 * typical)
-        & (fitted.residual < 0.25 * typical + 2.5 * float(np.nanmedian(fitted.residual)))
+        & (fitted.residual < 0.12 * typical + 2.5 * float(np.nanmedian(fitted.residual)))
     )
     return np.asarray(~fine)
