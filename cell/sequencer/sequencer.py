@@ -87,7 +87,7 @@ class Sequencer:
         self._writer, self._journal = writer, journal
         self._progress = progress or Progress(deque(range(len(plan.file.views))))
         self._started_s = self._clock.now() if started_s is None else started_s
-        self._listener = listener or (lambda status: None)
+        self._listener = listener or _nobody
         self._worker = Worker()
         self._state = State.IDLE
         self._view = ""
@@ -270,16 +270,24 @@ class Sequencer:
                 self._journal.write("close failed", device=name, reason=str(fault))
 
     def _tell(self, state: State, event: str | None = None) -> None:
+        """Tell the listener; one that fails (a terminal that is gone) is not asked again."""
         self._state = state
         progress = self._progress
-        self._listener(
-            Status(
-                state,
-                self._view,
-                len(progress.done),
-                len(progress.skipped),
-                len(self._plan.file.views),
-                self._time_left.estimate_s(progress, self._clock.now()),
-                event,
-            )
+        status = Status(
+            state,
+            self._view,
+            len(progress.done),
+            len(progress.skipped),
+            len(self._plan.file.views),
+            self._time_left.estimate_s(progress, self._clock.now()),
+            event,
         )
+        try:
+            self._listener(status)
+        except Exception as fault:
+            self._listener = _nobody
+            self._journal.write("listener failed", reason=str(fault))
+
+
+def _nobody(status: Status) -> None:
+    """Listen to nothing."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from concurrent.futures import Future, wait
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -151,8 +152,9 @@ class WatchedArm:
         if failure is None:
             return fault
         text = f"THE ARM DID NOT CONFIRM ITS STOP ({failure}). PRESS THE EMERGENCY STOP NOW."
-        sys.stderr.write(f"\a\n*** {text} ***\n")
-        sys.stderr.flush()
+        with suppress(OSError):  # a terminal that is gone must not hide the rest
+            sys.stderr.write(f"\a\n*** {text} ***\n")
+            sys.stderr.flush()
         return StopFailed(f"{text} It was to be stopped because: {fault}")
 
 

@@ -146,6 +146,17 @@ def test_a_failing_stop_is_the_loudest_error(
     assert bench.arm.calls.count("stop") == 3
 
 
+def test_a_terminal_that_is_gone_does_not_end_the_run(bench: Bench) -> None:
+    class Gone(list[Status]):
+        def append(self, status: Status) -> None:
+            raise BrokenPipeError
+
+    bench.told = Gone()
+    assert bench.run().finish is Finish.COMPLETED
+    assert "listener failed" in bench.events()
+    assert "stop" not in bench.arm.calls
+
+
 def test_no_stop_is_ordered_from_an_arm_that_was_never_reached(bench: Bench) -> None:
     def unreachable() -> None:
         raise DeviceUnreachable("no robot at 10.0.0.1")
