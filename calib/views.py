@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -128,6 +129,63 @@ class Views:
         return both.take(np.argsort(both.frame, kind="stable"))
 
     @classmethod
+    def from_corners(
+        cls,
+        board: Board,
+        corners_px: FloatArray,
+        *,
+        image_size_px: tuple[int, int],
+        base_from_flange: FloatArray | RigidTransform | None = None,
+        mount: Mount = "eye_in_hand",
+        robot_model: str | None = None,
+        **logged: FloatArray,
+    ) -> Views:
+        """Views of corners found elsewhere.
+
+        Parameters
+        ----------
+        board:
+            The target.
+        corners_px:
+            (N, M, 2) or (N, rows, cols, 2) pixels, row by row, (0, 0) at the centre of the
+            top-left pixel; NaN where a corner was not found. Every frame names the corners alike.
+        image_size_px:
+            (width, height).
+        base_from_flange:
+            N flange poses in the robot's base, metres: (N, 4, 4), or a
+            `scipy.spatial.transform.RigidTransform`; NaN or None where none was logged.
+        mount:
+            Whether the camera or the board sits on the flange.
+        robot_model:
+            Name of the arm's kinematic model, where joints are given.
+        **logged:
+            Further columns of the class: `joints_rad`, `t_s`, `temperature_c`, ...
+
+        Raises
+        ------
+        ValueError
+            An array has the wrong shape, or a column is not known.
+        """
+        corners = _checked_corners(corners_px, board)
+        width_px, height_px = image_size_px
+        views = cls.blank(
+            board, width_px=width_px, height_px=height_px, frames=len(corners), mount=mount
+        )
+        columns: dict[str, Any] = {"corners_px": corners}
+        if base_from_flange is not None:
+            given = base_from_flange
+            logged["base_from_flange"] = (
+                given.as_matrix() if isinstance(given, RigidTransform) else given
+            )
+        for name, value in logged.items():
+            if name not in _PER_FRAME:
+                raise ValueError(f"{name} is not a column; known are {', '.join(_PER_FRAME)}")
+            columns[name] = _checked_column(name, value, getattr(views, name))
+        if "frame" in columns:
+            columns["frame"] = columns["frame"].astype(np.int64)
+        return replace(views, robot_model=robot_model, **columns)
+
+    @classmethod
     def blank(
         cls,
         board: Board,
@@ -162,6 +220,26 @@ class Views:
             corner_sigma_px=missing(board.corner_count),
             blur_px=missing(),
         )
+
+
+def _checked_corners(corners_px: FloatArray, board: Board) -> FloatArray:
+    """(N, M, 2) of corners given so or as (N, rows, cols, 2)."""
+    corners = np.asarray(corners_px, dtype=np.float64)
+    if corners.ndim == 4 and corners.shape[1:] == (board.rows, board.cols, 2):
+        return corners.reshape(len(corners), -1, 2)
+    if corners.ndim == 3 and corners.shape[1:] == (board.corner_count, 2):
+        return corners
+    raise ValueError(
+        f"corners_px has the shape {corners.shape}; a board of {board.rows} rows and {board.cols}"
+        f" columns needs (N, {board.corner_count}, 2) or (N, {board.rows}, {board.cols}, 2)"
+    )
+
+
+def _checked_column(name: str, value: FloatArray, blank: FloatArray) -> FloatArray:
+    column = np.asarray(value, dtype=np.float64)
+    if column.shape[0] != len(blank) or column.ndim != blank.ndim:
+        raise ValueError(f"{name} has the shape {column.shape}; {blank.shape} is needed")
+    return column
 
 
 _PER_FRAME = (
