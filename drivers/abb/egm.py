@@ -33,10 +33,12 @@ class EgmReader:
     """
 
     def __init__(self, port: int, base_from_world: RigidTransform) -> None:
-        from ABBRobotEGM import EGM
-
         try:
+            from ABBRobotEGM import EGM
+
             self._egm = EGM(port=port)
+        except ImportError as error:
+            raise DeviceRefused(f"EGM: {error}: pip install 'calibration-cell[abb]'") from None
         except OSError as error:
             raise DeviceRefused(
                 f"EGM: UDP port {port} cannot be opened ({error}): close the other program that "

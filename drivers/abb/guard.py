@@ -12,9 +12,6 @@ import json
 import sys
 from typing import Any
 
-import requests
-from requests.auth import HTTPDigestAuth
-
 _TRIES = 3
 _ORDERS = (
     ("rw/rapid/execution?action=stop", {"stopmode": "stop"}),
@@ -34,13 +31,16 @@ class StopSession:
     """
 
     def __init__(self, url: str, user: str, password: str, timeout_s: float) -> None:
+        import requests
+        from requests.auth import HTTPDigestAuth
+
         self._url = url
         self._timeout_s = timeout_s
         self._session = requests.Session()
         self._session.auth = HTTPDigestAuth(user, password)
 
     def log_in(self) -> None:
-        """Make the first request, which costs the challenge; raises `requests` exceptions."""
+        """Make the first request, which costs the challenge; raises `OSError`."""
         self._session.get(f"{self._url}/rw/rapid/execution?json=1", timeout=self._timeout_s)
 
     def stop(self) -> str | None:
@@ -59,7 +59,7 @@ class StopSession:
             try:
                 address = f"{self._url}/{path}&json=1"
                 answer = self._session.post(address, data=payload, timeout=self._timeout_s)
-            except requests.RequestException as error:
+            except OSError as error:
                 why = type(error).__name__
                 continue
             return None if answer.ok else f"the controller refuses (HTTP {answer.status_code})"

@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import requests
-
 from drivers.abb.settings import ABBSettings
 from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable
 
@@ -35,6 +33,7 @@ def open_rws(url: str, settings: ABBSettings, before_request: BeforeRequest | No
         Called with method and URL before each request; may raise `Cancelled`.
     """
     try:
+        import abb_motion_program_exec  # noqa: F401 - told now rather than at the first move
         from abb_robot_client.rws import RWS
     except ImportError as error:
         raise DeviceRefused(
@@ -72,7 +71,7 @@ def named(url: str) -> Iterator[None]:
         yield
     except (DeviceError, Cancelled):
         raise
-    except requests.RequestException as error:
+    except OSError as error:  # of which everything that `requests` raises is a kind
         raise DeviceUnreachable(
             f"ABB arm {url}: Robot Web Services do not answer ({type(error).__name__}). Check "
             "power, cable (service or WAN port), address, and option 616-1 PC Interface; an "

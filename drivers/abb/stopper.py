@@ -13,8 +13,6 @@ import sys
 import threading
 from pathlib import Path
 
-import requests
-
 from drivers.abb.guard import StopSession
 from drivers.abb.settings import ABBSettings
 from drivers.errors import DeviceUnreachable
@@ -55,7 +53,7 @@ class Stopper:
         """Log in and start the guard; raises `DeviceUnreachable`."""
         try:
             self._session.log_in()
-        except requests.RequestException as error:
+        except OSError as error:
             raise DeviceUnreachable(f"ABB arm {self._url}: {error}") from None
         self._guard = subprocess.Popen(
             [sys.executable, "-P", str(_GUARD)],
