@@ -244,7 +244,7 @@ def fit_closely(
     if rough:
         first = fit_grid(image, first, clear=clear, iterations=2).parameters
     if _blur_share(first) > _MIXING_BLUR:
-        first = fit_grid(image, first, bent=True, clear=clear, iterations=2).parameters
+        first = fit_grid(image, first, bent=True, clear=clear, iterations=1).parameters
     return fit_grid(image, first, bent=True, clear=clear)
 
 
