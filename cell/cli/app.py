@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import warnings
 from collections.abc import Callable
 
 import typer
@@ -44,6 +45,8 @@ for name, verb in VERBS.items():
 def main() -> None:
     """Run the command line and leave with the contract's exit status."""
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s: %(message)s")
+    # Debian's own matplotlib shadows the 3-D axes of ours, which nothing here draws
+    warnings.filterwarnings("ignore", message="Unable to import Axes3D")
     try:
         app()
     except KeyboardInterrupt:
