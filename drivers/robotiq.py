@@ -198,18 +198,23 @@ class RobotiqCamera:
         )
 
     def _new_picture(self, http: RobotiqHttp, deadline_s: float) -> bytes:
-        lost = f"{self.device}: the server only repeats its last picture"
+        lost = ""
         while time.monotonic() < deadline_s - 2 * _REPEATED_PAUSE_S:
             try:
                 body = http.picture(deadline_s)
             except FrameLost as error:
                 lost = str(error)
                 continue
+            except DeviceUnreachable:
+                if lost:
+                    break  # it did answer before: the time has run out
+                raise
             if body != self._last:
                 self._last = body
                 return body
+            lost = f"{self.device}: the server only repeats its last picture"
             time.sleep(_REPEATED_PAUSE_S)
-        raise FrameLost(lost)
+        raise FrameLost(lost or f"{self.device}: no picture came in time")
 
     def _decoded(self, body: bytes) -> NDArray[np.generic]:
         image = cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_UNCHANGED)

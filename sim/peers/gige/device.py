@@ -93,6 +93,7 @@ class GigEPeer:
         self._behaviour = Behaviour(self.registers, self.streamer, lens, self._source)
         self.registers.set_word(0x0D1C, self.streamer.port)
         self.control = ControlPrivilege()
+        self._answered: dict[Host, tuple[gvcp.Request, bytes]] = {}
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind((self.address, gvcp.PORT))
         self._powered = True
@@ -145,16 +146,22 @@ class GigEPeer:
 
     def _answer(self, request: gvcp.Request, host: Host) -> None:
         self.control.hear(host)
-        try:
-            answer = gvcp.acknowledge(request, self._do(request, host))
-        except Refused as refusal:
-            answer = gvcp.acknowledge(request, status=refusal.status)
-        except struct.error:
-            answer = gvcp.acknowledge(request, status=Status.INVALID_PARAMETER)
+        former, answer = self._answered.get(host, (None, b""))
+        if request != former:  # a host repeats a command whose answer is late: it is done once
+            answer = self._result(request, host)
         if request.wants_answer:
+            self._answered[host] = request, answer
             time.sleep(self.faults.answer_delay_s)
             with contextlib.suppress(OSError):
                 self._socket.sendto(answer, host)
+
+    def _result(self, request: gvcp.Request, host: Host) -> bytes:
+        try:
+            return gvcp.acknowledge(request, self._do(request, host))
+        except Refused as refusal:
+            return gvcp.acknowledge(request, status=refusal.status)
+        except struct.error:
+            return gvcp.acknowledge(request, status=Status.INVALID_PARAMETER)
 
     def _do(self, request: gvcp.Request, host: Host) -> bytes:
         payload = request.payload

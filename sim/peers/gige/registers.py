@@ -67,6 +67,10 @@ class RegisterMap:
         feature = self._layout.get(address)
         return feature.name if feature else None
 
+    def address_of(self, name: str) -> int:
+        """Where a feature's register lies."""
+        return self._address_of[name]
+
     def get(self, name: str) -> ft.Value:
         """A feature's value."""
         at, feature = self._address_of[name], self._features[name]

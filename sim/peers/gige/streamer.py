@@ -12,7 +12,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drivers.camera import Camera
 from drivers.errors import DeviceError
@@ -57,7 +57,10 @@ class Faults:
 
 @dataclass(frozen=True)
 class Acquisition:
-    """How to take and where to send pictures; `period_s` None: only when triggered."""
+    """How to take and where to send pictures.
+
+    `period_s` None: only when triggered; `number` counts the acquisitions since power-on.
+    """
 
     host: tuple[str, int]
     packet_bytes: int
@@ -68,6 +71,7 @@ class Acquisition:
     exposure_s: float
     period_s: float | None
     single_frame: bool
+    number: int = 0
 
 
 class Streamer:
@@ -89,7 +93,7 @@ class Streamer:
         self._jobs: queue.Queue[Callable[[], None] | None] = queue.Queue()
         self._acquisition: Acquisition | None = None
         self._sent: deque[Block] = deque(maxlen=_KEPT_FOR_RESEND)
-        self._block_id = 0
+        self._block_id = self._started = 0
         self._powered_on_ns = time.monotonic_ns()
         self.resent_packets = 0
         self.frames_sent = 0
@@ -113,16 +117,16 @@ class Streamer:
         """Begin an acquisition; block ids restart at one, as the standard asks."""
         self._block_id = 0
         self._sent.clear()
-        self._acquisition = acquisition
+        self._started += 1
+        self._acquisition = replace(acquisition, number=self._started)
 
     def set_exposure(self, exposure_s: float) -> None:
         """Let a running acquisition follow a change of the exposure."""
         if self._acquisition:
-            values = {**self._acquisition.__dict__, "exposure_s": exposure_s}
-            self._acquisition = Acquisition(**values)
+            self._acquisition = replace(self._acquisition, exposure_s=exposure_s)
 
     def halt(self) -> None:
-        """End the acquisition; pictures still being exposed are dropped."""
+        """End the acquisition; pictures still being exposed or sent are dropped."""
         self._acquisition = None
 
     @property
@@ -199,11 +203,14 @@ class Streamer:
         time.sleep(max(0.0, closed_s - time.monotonic()))
         self._send(block, acquisition)
 
+    def _runs(self, acquisition: Acquisition) -> bool:
+        return self._acquisition is not None and self._acquisition.number == acquisition.number
+
     def _send(self, block: Block, acquisition: Acquisition) -> None:
         self._sent.append(block)
         begun_s, sent_bytes = time.monotonic(), 0
         for packet_id in range(block.packets):
-            if self._acquisition is None:
+            if not self._runs(acquisition):
                 return
             self._send_packet(block, packet_id, acquisition)
             sent_bytes += block.packet_bytes

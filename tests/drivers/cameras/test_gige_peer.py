@@ -29,12 +29,18 @@ class Host:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.settimeout(2.0)
         self.socket.connect((address, 3956))
+        self.request_id = 0
 
     def ask(self, command: int, payload: bytes = b"") -> tuple[int, bytes]:
-        self.socket.send(struct.pack(">BBHHH", 0x42, 1, command, len(payload), 7) + payload)
+        self.request_id += 1
+        return self.ask_again(command, payload)
+
+    def ask_again(self, command: int, payload: bytes = b"") -> tuple[int, bytes]:
+        head = struct.pack(">BBHHH", 0x42, 1, command, len(payload), self.request_id)
+        self.socket.send(head + payload)
         answer = self.socket.recv(4096)
         status, acknowledged, length, request_id = struct.unpack(">HHHH", answer[:8])
-        assert (acknowledged, length, request_id) == (command + 1, len(answer) - 8, 7)
+        assert (acknowledged, length, request_id) == (command + 1, len(answer) - 8, self.request_id)
         return status, answer[8:]
 
     def read(self, address: int) -> int:
@@ -88,6 +94,23 @@ def test_only_the_controller_may_write(peer: GigEPeer, host: Host) -> None:
     assert other.write(CONTROL_PRIVILEGE, 2) == ACCESS_DENIED
     assert other.read(HEARTBEAT_MS) == 1000
     other.socket.close()
+
+
+def test_a_command_that_is_repeated_for_a_late_answer_is_done_once(
+    peer: GigEPeer, host: Host
+) -> None:
+    host.write(CONTROL_PRIVILEGE, 2)
+    for name in ("TriggerMode", "TriggerSource", "AcquisitionStart"):
+        value = {"TriggerMode": 1}.get(name, 0)
+        assert host.write(peer.registers.address_of(name), value) == SUCCESS
+    trigger = struct.pack(">II", peer.registers.address_of("TriggerSoftware"), 1)
+    assert host.ask(WRITE_REGISTER, trigger)[0] == SUCCESS
+    assert host.ask_again(WRITE_REGISTER, trigger)[0] == SUCCESS
+    time.sleep(0.3)
+    assert peer.streamer.frames_sent == 1
+    assert host.ask(WRITE_REGISTER, trigger)[0] == SUCCESS
+    time.sleep(0.3)
+    assert peer.streamer.frames_sent == 2
 
 
 def test_a_controller_that_falls_silent_loses_control(peer: GigEPeer, host: Host) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import cv2
 import numpy as np
 import pytest
 
@@ -39,11 +40,9 @@ def through_http(source: SimCamera) -> Iterator[Camera]:
         yield RobotiqCamera(peer.address)
 
 
-@pytest.mark.parametrize(
-    ("wire", "noise_levels"), [(through_gige, 1.5), (through_http, 2.5)], ids=["gige", "http"]
-)
+@pytest.mark.parametrize("wire", [through_gige, through_http], ids=["gige", "http"])
 def test_what_comes_over_the_wire_is_what_the_simulation_shows(
-    wire: type, noise_levels: float
+    wire: type,
 ) -> None:
     arm = StandingArm(CELL.home_rad)
     direct, behind = (SimCamera(CELL, arm, WallClock()) for _ in range(2))
@@ -59,7 +58,7 @@ def test_what_comes_over_the_wire_is_what_the_simulation_shows(
             assert theirs.focus_position == ours.focus_position
             assert theirs.exposure_s == pytest.approx(ours.exposure_s, rel=1e-3)
             difference = theirs.image.astype(float) - ours.image.astype(float)
-            # two pictures of one scene differ by their photon noise, and by JPEG where it is used
-            assert np.abs(difference).mean() < noise_levels
-            assert abs(difference.mean()) < 0.2
+            # noise, and JPEG's where it is used, average out over blocks; a shift does not
+            blocks = cv2.resize(difference, None, fx=1 / 8, fy=1 / 8, interpolation=cv2.INTER_AREA)
+            assert np.abs(blocks).max() < 2.5
         camera.close()
