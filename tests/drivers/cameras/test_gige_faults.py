@@ -129,13 +129,13 @@ def test_a_swallowed_trigger_is_a_lost_frame_and_the_next_one_comes(
 
 
 def test_with_enough_time_a_swallowed_trigger_is_given_again(peer: GigEPeer, scene: Scene) -> None:
-    camera = AravisCamera(peer.address, GenICamOptions(exposure_s=0.005, patience_s=0.3))
+    camera = AravisCamera(peer.address, GenICamOptions(exposure_s=0.005, patience_s=0.5))
     camera.connect()
     peer.faults.skip_frames = 1
     scene.number = 9
     frame = camera.grab(5.0)
     assert number_in(frame.image) == 9
-    assert len(frame.raw["missed"]) == 1
+    assert "no frame came" in frame.raw["missed"][0]
     camera.close()
 
 
