@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from calib.chain.effect import Present
-from calib.chain.model import kinematics_of
+from calib.chain.model import CellModel, kinematics_of
 from calib.solver.elimination import solve_scaled
 from calib.solver.joint import JointFit, assemble
 from calib.solver.noise import JointEquations, scaled
@@ -92,6 +92,17 @@ def group_score(information: FloatArray, score: FloatArray, views: Views, price:
     return Score(gain, columns, float(f_distribution.sf(gain / columns, columns, freedom)), step)
 
 
+def amount_unknowns(model: CellModel, base: tuple[Unknown, ...]) -> tuple[Unknown, ...]:
+    """The amounts of a model's effects that are not among `base`."""
+    known = {u.place for u in base}
+    return tuple(
+        u
+        for u in unknowns_of(model, (), poses=False)
+        if u.place not in known
+        and model.effects[u.place[1]].effect.parameters[u.place[2]].role == "amount"
+    )
+
+
 def extended(
     fit: JointFit,
     views: Views,
@@ -105,11 +116,7 @@ def extended(
     """
     model = fit.model.with_effects((*fit.model.effects, *extra))
     base = len(fit.unknowns)
-    amounts = tuple(
-        u
-        for u in unknowns_of(model)[base:]
-        if model.effects[u.place[1]].effect.parameters[u.place[2]].role == "amount"
-    )
+    amounts = amount_unknowns(model, fit.unknowns)
     unknowns = (*fit.unknowns, *amounts)
     found = dependence(
         model, views, unknowns, kinematics=kinematics_of(views), flange_error=fit.flange_error
