@@ -14,20 +14,27 @@ import math
 import numpy as np
 from numba import njit
 
-from calib.chain.optics import OPTICS, WINDOW_INDEX
+from calib.chain.optics import COLUMN, OPTICS, WINDOW_INDEX
 from calib.views import FloatArray
 
 K = len(OPTICS)
+NOTHING, BROWN, EVERYTHING = 0, 1, 2
+"""Which derivatives a corner's walk gives: none; by the pose and the columns up to the thin prism;
+by every column. The rare ones (tilt, pupil, window, sweep) cost more than all others together."""
+
+FIRST_RARE, LAST_RARE = COLUMN["tilt_x_rad"], COLUMN["sweep_rz_rad"]
 N2 = WINDOW_INDEX * WINDOW_INDEX
 
 
-@njit(cache=True)
-def _axial_shift(o, x, y, z, out):  # type: ignore[no-untyped-def]
+@njit(cache=True, error_model="numpy")
+def _axial_shift(o, x, y, z, out, derive):  # type: ignore[no-untyped-def]
     """Depth seen by the pinhole, and its derivatives by x, y, z, pupil and window into `out`."""
     rho2 = x * x + y * y
     out[:] = 0.0
     out[2] = 1.0
     if o[19] == 0.0 and o[20] == 0.0:
+        if derive != EVERYTHING:
+            return z
         rho2_z2 = rho2 + z * z
         cos = z / math.sqrt(rho2_z2)
         theta = math.atan2(math.sqrt(rho2), z)
@@ -51,7 +58,7 @@ def _axial_shift(o, x, y, z, out):  # type: ignore[no-untyped-def]
     return z + shift
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _tilt_matrix(tx, ty, m):  # type: ignore[no-untyped-def]
     """OpenCV's tilted-sensor homography, row by row into the nine entries of `m`."""
     cx, sx, cy, sy = math.cos(tx), math.sin(tx), math.cos(ty), math.sin(ty)
@@ -69,7 +76,7 @@ def _tilt_matrix(tx, ty, m):  # type: ignore[no-untyped-def]
     m[8] = r22
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _tilted(o, xd, yd, m, j):  # type: ignore[no-untyped-def]
     """Point on the tilted sensor; its 2x2 derivative by (xd, yd) into `j[0:4]`."""
     _tilt_matrix(o[17], o[18], m)
@@ -84,13 +91,16 @@ def _tilted(o, xd, yd, m, j):  # type: ignore[no-untyped-def]
 
 
 # One straight run of assignments: split, numba would pass every intermediate through arrays.
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  # type: ignore[no-untyped-def]  # noqa: PLR0915
-    """One corner: pixel into `uv`; where `derive`, Jacobians into (2, 6) and (2, K) arrays."""
+    """One corner: pixel into `uv`; Jacobians by `derive` into (2, 6) and (2, K) arrays.
+
+    A rolling shutter and the rare columns' derivatives are seen to only with `EVERYTHING`.
+    """
     x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
     y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
     z = pose[2, 0] * px + pose[2, 1] * py + pose[2, 2] * pz + pose[2, 3]
-    zs = _axial_shift(o, x, y, z, shift)
+    zs = _axial_shift(o, x, y, z, shift, derive)
     a = x / zs
     b = y / zs
     r2 = a * a + b * b
@@ -108,7 +118,7 @@ def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  #
         xt, yt = _tilted(o, xd, yd, m, jt)
     uv[0] = o[0] * xt + o[2] * yt + o[3]
     uv[1] = o[1] * yt + o[4]
-    if not derive:
+    if derive == NOTHING:
         return
     # pixel by (xd, yd)
     ux = o[0] * jt[0] + o[2] * jt[2]
@@ -168,6 +178,8 @@ def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  #
     ):
         j_optics[0, column] = ux * dx + uy * dy
         j_optics[1, column] = vx * dx + vy * dy
+    if derive != EVERYTHING:
+        return
     _tilt_derivative(o, xd, yd, m, jt, j_optics)
     j_optics[0, 19] = us * shift[3]
     j_optics[1, 19] = vs * shift[3]
@@ -176,7 +188,7 @@ def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  #
     _sweep(o, uv, j_pose, j_optics)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _tilt_derivative(o, xd, yd, m, jt, j_optics):  # type: ignore[no-untyped-def]
     step = 1e-6
     for axis in (17, 18):
@@ -192,7 +204,7 @@ def _tilt_derivative(o, xd, yd, m, jt, j_optics):  # type: ignore[no-untyped-def
         j_optics[1, axis] = o[1] * dy
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _sweep(o, uv, j_pose, j_optics):  # type: ignore[no-untyped-def]
     """Move the corner by what the board swept until its row was read (first order)."""
     when = uv[1] / o[27] - 0.5
@@ -207,7 +219,13 @@ def _sweep(o, uv, j_pose, j_optics):  # type: ignore[no-untyped-def]
     uv[1] += dv * when
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, error_model="numpy")
+def _has_rare(o):  # type: ignore[no-untyped-def]
+    """Whether a rare column is not zero in this frame."""
+    return np.any(o[FIRST_RARE : LAST_RARE + 1] != 0.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _project_all(optics, poses, points, uv, j_pose, j_optics, derive):  # type: ignore[no-untyped-def]
     shift = np.zeros(5)
     m = np.zeros(9)
@@ -216,12 +234,9 @@ def _project_all(optics, poses, points, uv, j_pose, j_optics, derive):  # type: 
     jo = np.zeros((2, K))
     for i in range(poses.shape[0]):
         o = optics[i].copy()
-        sweeping = False
-        for k in range(21, 27):
-            sweeping = sweeping or o[k] != 0.0
+        need = EVERYTHING if derive or _has_rare(o) else NOTHING
         for j in range(points.shape[0]):
             p = points[j]
-            need = derive or sweeping
             _corner(o, poses[i], p[0], p[1], p[2], uv[i, j], jp, jo, shift, m, jt, need)
             if derive:
                 j_pose[i, j] = jp

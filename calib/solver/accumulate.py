@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from calib.chain.projection import K, _corner
+from calib.chain.projection import BROWN, EVERYTHING, FIRST_RARE, LAST_RARE, K, _corner, _has_rare
 from calib.views import FloatArray
 
 
 # One flat loop: this is where all the time goes, and numba inlines nothing across arrays.
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _accumulate(optics, poses, points, uv, weight, active, basis, gram, residual, cross, own):  # type: ignore[no-untyped-def]  # noqa: C901
     shift = np.zeros(5)
     m = np.zeros(9)
@@ -26,15 +26,19 @@ def _accumulate(optics, poses, points, uv, weight, active, basis, gram, residual
     row = np.zeros((2, q))
     jx = np.zeros((2, 3))
     corners = own.shape[0] > 0
+    rare = False
+    for k in range(ka):
+        rare = rare or FIRST_RARE <= active[k] <= LAST_RARE
     for i in range(poses.shape[0]):
         o = optics[i].copy()
         g = gram[i]
+        derive = EVERYTHING if rare or _has_rare(o) else BROWN
         for j in range(points.shape[0]):
             w = weight[i, j]
             if w == 0.0:
                 continue
             p = points[j]
-            _corner(o, poses[i], p[0], p[1], p[2], seen, jp, jo, shift, m, jt, True)
+            _corner(o, poses[i], p[0], p[1], p[2], seen, jp, jo, shift, m, jt, derive)
             for c in range(2):
                 for k in range(ka):
                     row[c, k] = jo[c, active[k]]
