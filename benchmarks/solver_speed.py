@@ -1,0 +1,264 @@
+"""CPU time and memory of the solver beside OpenCV's and mrcal's, on the same data.
+
+    python benchmarks/solver_speed.py [REPEATS]
+
+Camera 4096 x 3072, alpha 4750 px, k1 k2 p1 p2, 14 x 14 corners, noise 0.1 px, 0.35 to 1 m, tilts 0
+to 45 degrees. CPU seconds are user and system time of all threads, the least of the repeats, after
+one small fit that loads what is compiled. OpenCV finds its own start; ours and mrcal are timed from
+the same one, Zhang's closed form, whose own time is told in its own line.
+mrcal is asked through /usr/bin/python3 (Debian's python3-mrcal) and left out where it is missing.
+Every fit runs in a process of its own, whose greatest memory is told.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from calib.chain import rigid
+from calib.chain.effects import make_effect
+from calib.chain.kinematics import arm
+from calib.chain.model import CellModel
+from calib.chain.optics import COLUMN, optics_row
+from calib.chain.projection import project
+from calib.paper.homography import fit_homography
+from calib.paper.zhang import zhang_algebraic
+from calib.solver.free_poses import fit_free_poses
+from calib.solver.joint import assemble
+from calib.solver.unknowns import amounts, dependence, prior_information, unknowns_of
+from calib.views import Board, FloatArray, Views
+
+BOARD = Board("chessboard", rows=14, cols=14, square_m=0.0125)
+WIDTH, HEIGHT = 4096, 3072
+FREE = ("alpha_px", "beta_px", "u0_px", "v0_px", "k1", "k2", "p1", "p2")
+TRUE = optics_row(
+    alpha_px=4750.0,
+    beta_px=4755.0,
+    u0_px=2040.0,
+    v0_px=1541.0,
+    k1=-0.1,
+    k2=0.05,
+    p1=3e-4,
+    p2=-2e-4,
+    height_px=HEIGHT,
+)
+FIT_GOAL_S = {200: 0.06, 1000: 0.32}
+JOINT_GOAL_S = 0.14
+MIDDLE_RAD = np.array([0.3, -1.5, 1.6, -1.7, -1.5, 0.4])
+EFFECTS: dict[str, dict[str, float | str]] = {
+    "link_geometry": {},
+    "joint_zero_offset": {},
+    "joint_compliance": {},
+    "board_warp": {},
+    "board_scale": {},
+    "board_shear": {},
+    "focus_breathing": {"law": "thin_lens"},
+    "focus_hysteresis": {},
+    "entrance_pupil_shift": {},
+    "protective_window": {},
+    "distance_dependent_distortion": {},
+    "decentering": {},
+    "higher_order_radial": {},
+    "sensor_tilt": {},
+    "lens_sag": {},
+    "mount_flex": {},
+    "pose_time_lag": {},
+}
+
+
+def observed(frames: int) -> tuple[FloatArray, FloatArray]:
+    """(N, M, 2) corners and (N, 4, 4) true poses."""
+    rng = np.random.default_rng(1)
+    distance = rng.uniform(0.35, 1.0, frames)
+    azimuth, tilt = rng.uniform(0, 2 * np.pi, frames), np.radians(rng.uniform(0, 45, frames))
+    axis = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=1)
+    roll = Rotation.from_rotvec(rng.uniform(-0.6, 0.6, frames)[:, None] * [[0.0, 0.0, 1.0]])
+    poses = np.tile(np.eye(4), (frames, 1, 1))
+    poses[:, :3, :3] = (Rotation.from_rotvec(axis * tilt[:, None]) * roll).as_matrix()
+    aim = np.column_stack([rng.uniform(-0.06, 0.06, (frames, 2)), np.ones(frames)])
+    poses[:, :3, 3] = aim * distance[:, None] - poses[:, :3, :3] @ BOARD.corners_m.mean(axis=0)
+    optics = np.repeat(TRUE[None], frames, axis=0)
+    corners = project(optics, poses, BOARD.corners_m)
+    return corners + rng.normal(0, 0.1, corners.shape), poses
+
+
+def start(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Zhang's closed form: (K,) optics and (N, 4, 4) poses."""
+    flat = BOARD.corners_m[:, :2]
+    homographies = np.array([fit_homography(flat, c).matrix for c in corners])
+    row, poses = zhang_algebraic(homographies, BOARD.corners_m, corners, WIDTH, HEIGHT)
+    row[[COLUMN["skew_px"], COLUMN["k1"], COLUMN["k2"]]] = 0.0
+    return row, poses
+
+
+def fitted(corners: FloatArray, row: FloatArray, poses: FloatArray) -> FloatArray:
+    """(8,) our optimum from a start."""
+    optics = np.repeat(row[None], len(corners), axis=0)
+    fit = fit_free_poses(optics, poses, BOARD.corners_m, corners, FREE)
+    return fit.optics[0, [COLUMN[name] for name in FREE]]
+
+
+def opencv(corners: FloatArray) -> FloatArray:
+    """(8,) OpenCV's optimum."""
+    import cv2
+
+    points = [BOARD.corners_m.astype(np.float32)] * len(corners)
+    seen = [c.astype(np.float32) for c in corners]
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
+    _, A, k, *_ = cv2.calibrateCamera(
+        points, seen, (WIDTH, HEIGHT), None, None, flags=cv2.CALIB_FIX_K3, criteria=criteria
+    )
+    return np.array([A[0, 0], A[1, 1], A[0, 2], A[1, 2], *np.ravel(k)[:4]])
+
+
+def joint_cell(frames: int) -> tuple[CellModel, Views]:
+    """A cell with 36 numbers of effects beside the plain 18, and what it recorded."""
+    rng = np.random.default_rng(2)
+    kinematics = arm("ur5e")
+    joints = MIDDLE_RAD + rng.uniform(-0.12, 0.12, (frames, 6))
+    ahead = rigid.compose(np.array([0.3, 0.2, 0.1]), np.array([-0.08, -0.08, 0.55]))
+    mounted = rigid.compose(np.array([0.02, -0.03, 0.7]), np.array([0.03, -0.04, 0.09]))
+    fixed = kinematics.forward(MIDDLE_RAD) @ mounted @ ahead
+    effects = [make_effect(name, given) for name, given in EFFECTS.items()]
+    model = CellModel(TRUE, mounted, fixed, tuple(effects))
+    blank = Views.blank(BOARD, width_px=WIDTH, height_px=HEIGHT, frames=frames)
+    flange = kinematics.forward(joints)
+    seen = project(
+        np.repeat(TRUE[None], frames, axis=0),
+        rigid.inverse(flange @ mounted) @ fixed,
+        BOARD.corners_m,
+    )
+    views = replace(
+        blank,
+        corners_px=seen,
+        base_from_flange=flange,
+        joints_rad=joints,
+        approach_joints_rad=joints + rng.uniform(-0.1, 0.1, joints.shape),
+        joint_velocity_rad_s=rng.uniform(-0.5, 0.5, joints.shape),
+        t_s=np.arange(frames, dtype=float),
+        robot_model="ur5e",
+        moving=True,
+    )
+    return model, views
+
+
+def normal_equations(model: CellModel, views: Views) -> FloatArray:
+    """Linearise the chain and go once over all corners."""
+    unknowns = unknowns_of(model, (*FREE[:6],))
+    error = np.zeros((len(views), 6))
+    found = dependence(model, views, unknowns, kinematics=arm("ur5e"), flange_error=error)
+    prior = (amounts(model, unknowns), prior_information(unknowns))
+    weight = np.ones(views.corners_px.shape[:2])
+    equations, _ = assemble(found, views, weight, error, None, prior)
+    return equations.frames.shared
+
+
+def measured(work: Callable[[], FloatArray], repeats: int) -> dict[str, Any]:
+    """Median CPU seconds, and the greatest memory so far."""
+    times = []
+    for _ in range(repeats):
+        began = time.process_time()
+        result = work()
+        times.append(time.process_time() - began)
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return {"seconds": min(times), "peak_mb": peak_mb, "result": result.tolist()}
+
+
+def child(what: str, frames: int, repeats: int) -> dict[str, Any]:
+    """What one process measures."""
+    if what == "joint":
+        normal_equations(*joint_cell(5))
+        cell = joint_cell(frames)
+        return measured(lambda: normal_equations(*cell), repeats)
+    few, corners = observed(10)[0], observed(frames)[0]
+    if what == "opencv":
+        opencv(few)
+        return measured(lambda: opencv(corners), repeats)
+    fitted(few, *start(few))
+    if what == "start":
+        return measured(lambda: start(corners)[0], 1)
+    begin = start(corners)
+    return measured(lambda: fitted(corners, *begin), repeats)
+
+
+def mrcal(frames: int, repeats: int) -> dict[str, Any] | None:
+    """mrcal's own measurement in its own interpreter, from our start."""
+    with tempfile.TemporaryDirectory() as folder:
+        data = Path(folder) / "data.npz"
+        corners, _ = observed(frames)
+        row, poses = start(corners)
+        rotation = Rotation.from_matrix(poses[:, :3, :3]).as_rotvec()
+        np.savez(
+            data,
+            corners=corners.reshape(frames, BOARD.rows, BOARD.cols, 2),
+            intrinsics=[*(row[COLUMN[name]] for name in FREE[:4]), 0.0, 0.0, 0.0, 0.0],
+            poses=np.concatenate([rotation, poses[:, :3, 3]], axis=1),
+            square_m=BOARD.square_m,
+            size=[WIDTH, HEIGHT],
+        )
+        script = Path(__file__).with_name("solver_speed_mrcal.py")
+        return answer(["/usr/bin/python3", str(script), str(data), str(repeats)])
+
+
+def answer(command: list[str]) -> dict[str, Any] | None:
+    """The last line a process prints, as JSON; None where it fails."""
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        print(f"{command[1]}: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
+        return None
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def main() -> None:
+    """Measure everything and print a table in Markdown."""
+    if sys.argv[1:2] == ["--child"]:
+        print(json.dumps(child(sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))))
+        return
+    repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 5
+    me = [sys.executable, __file__, "--child"]
+    print(f"load average {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
+    print("| work | solver | CPU s | goal | peak memory MB | largest difference from ours, px |")
+    print("|---|---|---|---|---|---|")
+    for frames, goal in FIT_GOAL_S.items():
+        found = {
+            who: answer([*me, who, str(frames), str(repeats)])
+            for who in ("ours", "start", "opencv")
+        } | {"mrcal": mrcal(frames, repeats)}
+        for who, one in found.items():
+            if one is None or found["ours"] is None:
+                continue
+            told = f"{goal}" if who == "ours" else ""
+            gap = ""
+            if who != "start":
+                off = np.subtract(one["result"], found["ours"]["result"])[:4]
+                gap = f"{np.abs(off).max():.4f}"
+            print(
+                f"| {frames} x {BOARD.corner_count} | {who} | {one['seconds']:.3f} | {told} |"
+                f" {one['peak_mb']:.0f} | {gap} |"
+            )
+    for frames in (1000, 10_000):
+        one = answer([*me, "joint", str(frames), "3"])
+        if one is not None:
+            shared = len(one["result"])
+            goal_told = f"{JOINT_GOAL_S}" if frames == 1000 else ""
+            print(
+                f"| {frames} x {BOARD.corner_count}, normal equations, {shared} shared | ours |"
+                f" {one['seconds']:.3f} | {goal_told} | {one['peak_mb']:.0f} | |"
+            )
+
+
+if __name__ == "__main__":
+    main()

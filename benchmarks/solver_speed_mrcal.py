@@ -1,0 +1,48 @@
+"""mrcal's part of `solver_speed.py`, for the interpreter that has mrcal (2.2, Debian's)."""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+
+import mrcal
+import numpy as np
+
+
+def solve(data):
+    """(8,) the optimum."""
+    frames = len(data["corners"])
+    intrinsics = np.array(data["intrinsics"], dtype=float)[None]
+    indices = np.zeros((frames, 3), dtype=np.int32)
+    indices[:, 0] = np.arange(frames)
+    indices[:, 2] = -1
+    weight = np.ones((*data["corners"].shape[:3], 1))
+    mrcal.optimize(
+        intrinsics=intrinsics,
+        extrinsics_rt_fromref=None,
+        frames_rt_toref=np.array(data["poses"], dtype=float),
+        points=None,
+        observations_board=np.ascontiguousarray(np.concatenate([data["corners"], weight], axis=3)),
+        indices_frame_camintrinsics_camextrinsics=indices,
+        observations_point=None,
+        indices_point_camintrinsics_camextrinsics=None,
+        lensmodel="LENSMODEL_OPENCV4",
+        imagersizes=np.array([data["size"]], dtype=np.int32),
+        calibration_object_spacing=float(data["square_m"]),
+        do_optimize_calobject_warp=False,
+        do_apply_outlier_rejection=False,
+        do_apply_regularization=False,
+    )
+    return intrinsics[0]
+
+
+data = dict(np.load(sys.argv[1]))
+times = []
+for _ in range(int(sys.argv[2])):
+    began = time.process_time()
+    result = solve(data)
+    times.append(time.process_time() - began)
+peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+print(json.dumps({"seconds": min(times), "peak_mb": peak_mb, "result": result.tolist()}))
