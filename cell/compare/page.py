@@ -79,5 +79,5 @@ def draw(comparison: Comparison, part: Difference) -> Figure:
         )  # fmt: skip
         ax.set(xlim=(0, width), ylim=(height, 0), aspect="equal", xlabel="u (px)", ylabel="v (px)")
         ax.set_title(f"at {comparison.field.distances_m[k]:.3f} m")
-        figure.colorbar(shade, ax=ax, shrink=0.8, pad=0.02).set_label("difference (px)")
+        figure.colorbar(shade, ax=ax, shrink=0.6, pad=0.02).set_label("difference (px)")
     return figure

@@ -19,7 +19,7 @@ from cell.export.reading import DISTORTION
 from tests.export.calibrations import DISTORTIONS, POINTS_M, own_projection
 
 AGREES_PX = 1e-6
-ROOT = Path(__file__).parents[2]
+MRCAL = Path(__file__).parents[2] / ".mrcal" / "bin" / "python"
 
 
 def _camera(kind: str) -> Camera:
@@ -124,17 +124,32 @@ print(json.dumps({"pixels": pixels.tolist(), "size": [int(n) for n in model.imag
 """
 
 
-@pytest.fixture(scope="session")
-def mrcal_folder() -> Path:
-    """The folder of mrcal's programs and its Python."""
-    python = ROOT / ".mrcal" / "bin" / "python"
+def _has_mrcal(python: Path) -> bool:
     if not python.exists():
+        return False
+    asked = subprocess.run([python, "-c", "import mrcal"], capture_output=True, check=False)
+    return asked.returncode == 0
+
+
+@pytest.fixture(scope="session")
+def mrcals() -> list[Path]:
+    """Every Python with mrcal: PyPI's (2.5 or newer), and Debian's (2.2) where it happens to be."""
+    found = [p for p in (MRCAL, Path("/usr/bin/python3")) if _has_mrcal(p)]
+    if not found:
         pytest.skip("mrcal is not installed: run tools/install-mrcal (needs Python 3.12 or newer)")
-    return python.parent
+    return found
 
 
-def _mrcal_projection(folder: Path, model: Path) -> FloatArray:
-    command = [folder / "python", "-c", MRCAL_PROJECTS, model, json.dumps(POINTS_M.tolist())]
+@pytest.fixture(scope="session")
+def new_mrcal(mrcals: list[Path]) -> Path:
+    """PyPI's, which reads other programs' files, too."""
+    if MRCAL not in mrcals:
+        pytest.skip("mrcal 2.5 is not installed: run tools/install-mrcal (needs Python 3.12)")
+    return MRCAL
+
+
+def _mrcal_projection(python: Path, model: Path) -> FloatArray:
+    command = [python, "-c", MRCAL_PROJECTS, model, json.dumps(POINTS_M.tolist())]
     said = json.loads(_run(command))
     assert said["size"] == [4096, 3072]
     return np.array(said["pixels"])
@@ -147,24 +162,25 @@ def _run(command: list[str | Path]) -> str:
 
 
 @pytest.mark.parametrize("kind", DISTORTIONS)
-def test_mrcal_reads_it(kind: str, mrcal_folder: Path, tmp_path: Path) -> None:
+def test_mrcal_reads_it(kind: str, mrcals: list[Path], tmp_path: Path) -> None:
     camera, path = _camera(kind), tmp_path / "camera.cameramodel"
     path.write_text(mrcal.text(camera))
-    _assert_agrees(_mrcal_projection(mrcal_folder, path), camera)
+    for python in mrcals:
+        _assert_agrees(_mrcal_projection(python, path), camera)
 
 
-def test_mrcal_reads_the_ros_file_too(mrcal_folder: Path, tmp_path: Path) -> None:
+def test_mrcal_reads_the_ros_file_too(new_mrcal: Path, tmp_path: Path) -> None:
     camera, path = _camera("three radial"), tmp_path / "camera_info.yaml"
     path.write_text(ros.text(camera))
-    _assert_agrees(_mrcal_projection(mrcal_folder, path), camera)
+    _assert_agrees(_mrcal_projection(new_mrcal, path), camera)
 
 
-def test_mrcal_reads_the_kalibr_file_too(mrcal_folder: Path, tmp_path: Path) -> None:
+def test_mrcal_reads_the_kalibr_file_too(new_mrcal: Path, tmp_path: Path) -> None:
     camera, path = _camera("decentred"), tmp_path / "camchain.yaml"
     path.write_text(kalibr.text(camera))
-    _run([mrcal_folder / "python", mrcal_folder / "mrcal-from-kalibr", path])
+    _run([new_mrcal, new_mrcal.with_name("mrcal-from-kalibr"), path])
     model = tmp_path / "camchain-cam0.cameramodel"
-    _assert_agrees(_mrcal_projection(mrcal_folder, model), camera)
+    _assert_agrees(_mrcal_projection(new_mrcal, model), camera)
 
 
 @pytest.mark.parametrize(
