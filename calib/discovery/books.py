@@ -16,6 +16,7 @@ from calib.discovery.bookkeeping.pairing import find_odd_frames, find_offset
 from calib.discovery.bookkeeping.recover import recover_joints, recover_poses
 from calib.discovery.bookkeeping.robot_model import find_robot_model
 from calib.discovery.bookkeeping.slip import ROBOT_COLUMNS, Slip
+from calib.discovery.bookkeeping.which_arm import recognise_arm
 from calib.discovery.start import FreeViews, free_views
 from calib.errors import CalibrationError
 from calib.views import BoolArray, FloatArray, Views
@@ -43,6 +44,8 @@ class Books:
         What was worked out rather than logged, and what could not be.
     has_robot:
         False where there are no poses to hold the pictures against.
+    joints_logged:
+        False where the joints were worked out from the poses, by a first choice of branches.
     """
 
     views: Views
@@ -52,6 +55,7 @@ class Books:
     rejected: tuple[Rejection, ...]
     said: tuple[str, ...]
     has_robot: bool
+    joints_logged: bool
 
 
 def keep_books(views: Views, log: Views) -> Books:
@@ -74,15 +78,19 @@ def keep_books(views: Views, log: Views) -> Books:
     loop = mounted_from_fixed(free.camera_from_board, views.mount)
     rejected = list(baseline.rejected)
     good = np.asarray(np.isfinite(free.camera_from_board).all(axis=(1, 2)))
+    views, arm_said = recognise_arm(views)
+    log = replace(log, robot_model=views.robot_model)
     recovered = recover_poses(views)
     views, log, said = recovered.views, recover_poses(log).views, list(recovered.said)
+    said += [] if arm_said is None else [arm_said]
     if int((views.has_pose & good).sum()) < FEWEST_FRAMES:
         said.append("no robot poses: what a free camera pose can absorb cannot be seen")
         views = _without_robot(views, free)
-        return _books(views, log, free, [], rejected, said, False, good)
+        return _books(views, log, free, [], rejected, said, False, good, True)
     slips: list[Slip] = []
     views, log, loop_slips = _mend_conventions(views, log, loop)
     slips += loop_slips
+    joints_logged = bool(np.isfinite(log.joints_rad).any())
     worked_out = recover_joints(log)
     log, said = worked_out.views, [*said, *worked_out.said]
     views = _rows_of(views, log)
@@ -107,7 +115,7 @@ def keep_books(views: Views, log: Views) -> Books:
             f"only {int(kept.sum())} frames have a board and a flange pose that belong together;"
             f" a diagnosis needs {FEWEST_FRAMES}"
         )
-    return _books(views, log, free, slips, rejected, said, True, kept)
+    return _books(views, log, free, slips, rejected, said, True, kept, joints_logged)
 
 
 def _rows_of(views: Views, log: Views) -> Views:
@@ -150,6 +158,7 @@ def _books(
     said: list[str],
     has_robot: bool,
     kept: BoolArray,
+    joints_logged: bool,
 ) -> Books:
     kept_free = replace(free, camera_from_board=free.camera_from_board[kept])
     return Books(
@@ -160,4 +169,5 @@ def _books(
         tuple(rejected),
         tuple(said),
         has_robot,
+        joints_logged,
     )

@@ -10,7 +10,9 @@ from scipy.stats import chi2
 
 from calib.chain.effect import Present
 from calib.chain.effects import catalogue
+from calib.chain.model import kinematics_of
 from calib.discovery.ambiguity import ambiguities
+from calib.discovery.bookkeeping.branches import choose_branches, with_branches
 from calib.discovery.bookkeeping.slip import Slip
 from calib.discovery.books import Books, keep_books
 from calib.discovery.candidates import unseen
@@ -56,10 +58,11 @@ def diagnose(
         When the recording cannot even be calibrated.
     """
     books = keep_books(views, views if log is None else log)
+    books, branch_price = _with_branches(books)
     held = held_out(len(books.views))
     fitter = Fitter(books.views.take(~held), books.has_robot)
     before = fit_start(fitter, books.free, ~held)
-    search = Search(before, fitter)
+    search = Search(before, fitter, branch_price)
     if forced is None:
         search.run()
         leftover = look_for_leftover(search)
@@ -67,6 +70,22 @@ def diagnose(
         search.force(forced)
         leftover = Leftover(search, ())
     return _told(books, held, before, leftover)
+
+
+def _with_branches(books: Books) -> tuple[Books, float]:
+    """Choose the arm's branches where joints were not logged; and the price of the choice."""
+    views = books.views
+    kinematics = kinematics_of(views)
+    if books.joints_logged or not books.has_robot or kinematics is None:
+        return books, 0.0
+    every = np.ones(len(views), dtype=bool)
+    chosen = choose_branches(fit_start(Fitter(views), books.free, every), views, kinematics)
+    mended = replace(
+        books,
+        views=with_branches(views, chosen, views.frame),
+        log=with_branches(books.log, chosen, views.frame),
+    )
+    return mended, chosen.price
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,8 @@ def criterion(fit: JointFit, views: Views, choices: int = 1) -> float:
 class Search:
     """Forward selection on one recording."""
 
-    def __init__(self, start: JointFit, fitter: Fitter) -> None:
+    def __init__(self, start: JointFit, fitter: Fitter, branch_price: float = 0.0) -> None:
+        self.branch_price = branch_price
         self.fitter, self.views = fitter, fitter.views
         self.best = Trial(start, criterion(start, fitter.views))
         self.steps: list[Step] = []
@@ -89,16 +90,25 @@ class Search:
         return list(best.values())
 
     def _promise(self, candidate: Candidate, score: Score) -> float:
-        return bic(score.gain, score.columns, self.views) - 2.0 * float(np.log(candidate.choices))
+        return bic(score.gain, score.columns, self.views) - self._price(candidate)
+
+    def _price(self, candidate: Candidate) -> float:
+        """Price of picking the best among shapes, and among branches of the arm."""
+        price = 2.0 * float(np.log(candidate.choices))
+        on_joints = "joints_rad" in candidate.effect.needs
+        return price + (self.branch_price if on_joints and not self._joints_paid() else 0.0)
+
+    def _joints_paid(self) -> bool:
+        """Whether an effect that is in the model has paid for the choice of branches."""
+        return any("joints_rad" in step.taken.effect.needs for step in self.steps)
 
     def earnest(self, fit: JointFit, picked: Sequence[Candidate]) -> list[tuple[Candidate, Trial]]:
         """Fit each candidate next to what the model has."""
         trials = []
         for candidate in picked:
             tried = self.fitter.with_effects(fit, (*fit.model.effects, candidate.present))
-            trials.append(
-                (candidate, Trial(tried, criterion(tried, self.views, candidate.choices)))
-            )
+            value = criterion(tried, self.views) + self._price(candidate)
+            trials.append((candidate, Trial(tried, value)))
         return sorted(trials, key=lambda pair: pair[1].criterion)
 
     def _take(self) -> bool:

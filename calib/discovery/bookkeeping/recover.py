@@ -27,11 +27,11 @@ def recover_poses(views: Views) -> Recovered:
 
 def recover_joints(views: Views) -> Recovered:
     """Fill in joints from poses (mended ones), and approaches from the order of the log."""
-    said: tuple[str, ...] = ()
-    if views.robot_model is not None:
-        views, said = _joints_from_poses(views, arm(views.robot_model))
-    views, more = _approaches(views)
-    return Recovered(views, (*said, *more))
+    if np.isfinite(views.joints_rad).any():
+        return Recovered(*_approaches(views))
+    if views.robot_model is None:
+        return Recovered(views, ())
+    return Recovered(*_joints_from_poses(views, arm(views.robot_model)))
 
 
 def _poses_from_joints(views: Views, kinematics: ArmKinematics) -> tuple[Views, tuple[str, ...]]:
