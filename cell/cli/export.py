@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -27,6 +28,9 @@ def export(
     solution: Annotated[
         str | None, typer.Option("--solution", help="Which solution; the best one without.")
     ] = None,
+    image_size: Annotated[
+        str | None, typer.Option(help="WIDTHxHEIGHT, for a file that does not tell.")
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Write the calibrated camera for ROS, OpenCV, mrcal, Kalibr, COLMAP or as JSON."""
@@ -36,7 +40,11 @@ def export(
     path = calibration_file(calibration)
     try:
         exported = export_calibration(
-            read_calibration(path), tool, distance_m=distance, solution=solution
+            read_calibration(path),
+            tool,
+            distance_m=distance,
+            solution=solution,
+            image_size_px=None if image_size is None else _size(image_size),
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -50,6 +58,13 @@ def export(
     written = None if output is None else str(output)
     result = {"format": tool, "file": written, "text": exported.text, "warnings": exported.warnings}
     show(f"{tool}: {output}", result, as_json=as_json)
+
+
+def _size(words: str) -> tuple[int, int]:
+    found = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", words)
+    if found is None:
+        raise InputError(f"--image-size {words}: must be WIDTHxHEIGHT, such as 4096x3072")
+    return int(found[1]), int(found[2])
 
 
 def _write(path: Path, text: str) -> None:

@@ -128,6 +128,12 @@ def _notes(a: Side, b: Side, mounted: Difference | None) -> tuple[str, ...]:
     ]
     if mounted is None:
         notes.append("the cameras' places on the robot are not both known: not compared")
+    notes += [
+        f"{side.label}: its focal length has a corner at the edge of zone 2; the smooth"
+        f" {side.law} law is compared, not zone 2's own value"
+        for side in (a, b)
+        if side.has_corner
+    ]
     if a.solution != b.solution:
         notes.append(f"solution {a.solution} is compared with {b.solution}")
     return tuple(notes)

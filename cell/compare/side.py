@@ -53,6 +53,8 @@ class Side:
         Coefficients beyond k1 and k2, held.
     place_name, place:
         `flange_from_camera` or `base_from_camera` and its (4, 4); empty and None where unknown.
+    has_corner:
+        True where the scale factors have a corner that no smooth law has.
     """
 
     label: str
@@ -67,6 +69,7 @@ class Side:
     more_distortion: dict[str, float]
     place_name: str
     place: FloatArray | None
+    has_corner: bool
 
     @property
     def knows_chance(self) -> bool:
@@ -114,7 +117,7 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
             f"{label}: does not tell the image's size and distances: it was written by an older"
             " version. Run cell calibrate anew"
         )
-    name = calibration.recommended()
+    name, zones = calibration.recommended(), calibration.zones
     solution, law = calibration.solution(name), moving_law(calibration, name)
     place_name = next((n for n in _PLACES if getattr(calibration, n) is not None), "")
     place: TransformSource | None = getattr(calibration, place_name) if place_name else None
@@ -132,6 +135,7 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
         more_distortion=dict(zip(DISTORTION[2:], solution.distortion[2:], strict=True)),
         place_name=place_name,
         place=None if place is None else place.matrix,
+        has_corner=law is not None and zones is not None and zones.method == "change_point",
     )
 
 

@@ -17,8 +17,8 @@ class Camera:
 
     Attributes
     ----------
-    width_px, height_px:
-        Size of the image.
+    image_size_px:
+        (width, height) of the image, or None where nothing tells.
     alpha_px, beta_px, u0_px, v0_px:
         Focal lengths and principal point, (0, 0) at the centre of the top-left pixel.
     distortion:
@@ -27,8 +27,7 @@ class Camera:
         What it is and where it came from, one line, for a comment in the file.
     """
 
-    width_px: int
-    height_px: int
+    image_size_px: tuple[int, int] | None
     alpha_px: float
     beta_px: float
     u0_px: float
@@ -44,9 +43,17 @@ class Camera:
             beta_px=self.beta_px,
             u0_px=self.u0_px,
             v0_px=self.v0_px,
-            height_px=self.height_px,
             **dict(zip(DISTORTION, self.distortion, strict=True)),
         )
+
+    def size_px(self, tool: str) -> tuple[int, int]:
+        """(width, height); raises `InputError` where nothing tells, naming the tool in need."""
+        if self.image_size_px is None:
+            raise InputError(
+                f"the calibration does not tell the image's size, which {tool} needs: say"
+                " --image-size WIDTHxHEIGHT, or run cell calibrate anew"
+            )
+        return self.image_size_px
 
     def coefficients(self, lengths: Sequence[int], tool: str) -> tuple[float, ...]:
         """As many distortion coefficients as `tool` takes, of the lengths it takes.

@@ -38,6 +38,7 @@ def export_calibration(
     *,
     distance_m: float | None = None,
     solution: str | None = None,
+    image_size_px: tuple[int, int] | None = None,
 ) -> Exported:
     """The calibrated camera in a tool's own format.
 
@@ -51,6 +52,8 @@ def export_calibration(
         Where a focal length that moves is taken; `json` alone can do without.
     solution:
         Name of the solution; the recommended one where None.
+    image_size_px:
+        (width, height) for a file that does not tell.
 
     Raises
     ------
@@ -69,17 +72,16 @@ def export_calibration(
     if law is not None and distance_m is None:
         raise InputError(refusal(calibration, name, tool))
     _refuse_skew(found, name, tool)
-    return Exported(TEXTS[tool](_camera(calibration, name, tool, distance_m)), warnings)
+    size = calibration.image_size_px or image_size_px
+    return Exported(TEXTS[tool](_camera(calibration, name, size, distance_m)), warnings)
 
 
 def _camera(
-    calibration: CalibrationSource, name: str, tool: str, distance_m: float | None
+    calibration: CalibrationSource,
+    name: str,
+    image_size_px: tuple[int, int] | None,
+    distance_m: float | None,
 ) -> Camera:
-    if calibration.image_size_px is None:
-        raise InputError(
-            f"the calibration does not tell the image's size, which {tool} needs: it was written"
-            " by an older version. Run cell calibrate anew"
-        )
     found = calibration.solution(name)
     alpha, beta = found.alpha_px, found.beta_px
     at = "at every distance"
@@ -88,8 +90,7 @@ def _camera(
         at = f"at {distance_m:g} m only, its focal length moves"
     recording = " ".join(calibration.recording.split())
     return Camera(
-        width_px=calibration.image_size_px[0],
-        height_px=calibration.image_size_px[1],
+        image_size_px=image_size_px,
         alpha_px=alpha,
         beta_px=beta,
         u0_px=found.u0_px,

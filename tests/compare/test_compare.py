@@ -124,6 +124,11 @@ def test_a_law_of_the_scale_factors_is_compared_as_exported() -> None:
     assert beta / alpha == pytest.approx(4789.1456 / 4755.8123)
 
 
+def test_a_corner_in_the_focal_length_is_noted() -> None:
+    cornered = MOVING | {"zones": MOVING["zones"] | {"method": "change_point"}}
+    assert "corner at the edge of zone 2" in " ".join(compare(_side(cornered), _side(MOVING)).notes)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -25,8 +25,7 @@ MRCAL = Path(__file__).parents[2] / ".mrcal" / "bin" / "python"
 def _camera(kind: str) -> Camera:
     given = DISTORTIONS[kind]
     return Camera(
-        width_px=4096,
-        height_px=3072,
+        image_size_px=(4096, 3072),
         alpha_px=4755.8123456789,
         beta_px=4789.1,
         u0_px=2052.3,

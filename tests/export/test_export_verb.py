@@ -115,6 +115,9 @@ def test_an_older_file_without_the_image_s_size_is_told_apart(tmp_path: Path) ->
     content = {key: value for key, value in STILL.items() if key != "image_size_px"}
     with pytest.raises(InputError, match="does not tell the image's size"):
         _export(tmp_path, content, "kalibr")
+    size = (1279, 724)
+    assert "resolution: [1279, 724]" in _export(tmp_path, content, "kalibr", image_size_px=size)
+    assert _alpha_beta(_export(tmp_path, content, "opencv"))[0] == 4755.8123
 
 
 @pytest.mark.parametrize(
@@ -151,6 +154,7 @@ def test_the_verb_tells_the_file_in_its_refusals(tmp_path: Path) -> None:
     for arguments, words in (
         (["--format", "ros"], f"{path}: the focal length follows the distance"),
         (["--format", "halcon"], "known are ros, opencv, mrcal, kalibr, colmap, json"),
+        (["--format", "ros", "--image-size", "big"], "must be WIDTHxHEIGHT, such as 4096x3072"),
         (["--format", "ros", "--solution", "mine"], "has no solution mine; it has zhang_mle"),
     ):
         refused = CliRunner().invoke(app, ["export", str(path), *arguments])

@@ -15,12 +15,13 @@ def text(camera: Camera) -> str:
     The principal point is moved by half a pixel in each direction, for COLMAP's origin.
     """
     d = camera.coefficients(tuple(_MODELS), "colmap")
+    width, height = camera.size_px("colmap")
     centre = (camera.u0_px + _CORNER, camera.v0_px + _CORNER)
     values = (camera.alpha_px, camera.beta_px, *centre, *d)
     return (
         f"# {camera.about}\n"
         "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]; pixel centres are at (0.5, 0.5)\n"
-        f"1 {_MODELS[len(d)]} {camera.width_px} {camera.height_px} "
+        f"1 {_MODELS[len(d)]} {width} {height} "
         + " ".join(repr(float(value)) for value in values)
         + "\n"
     )

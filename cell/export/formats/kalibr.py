@@ -12,6 +12,7 @@ def text(camera: Camera) -> str:
     coordinates are OpenCV's.
     """
     d = camera.coefficients((4,), "kalibr")
+    width, height = camera.size_px("kalibr")
     intrinsics = (camera.alpha_px, camera.beta_px, camera.u0_px, camera.v0_px)
     return (
         f"# {camera.about}\n"
@@ -21,7 +22,7 @@ def text(camera: Camera) -> str:
         f"  distortion_coeffs: {_list(d)}\n"
         "  distortion_model: radtan\n"
         f"  intrinsics: {_list(intrinsics)}\n"
-        f"  resolution: [{camera.width_px}, {camera.height_px}]\n"
+        f"  resolution: [{width}, {height}]\n"
         "  rostopic: /camera/image_raw\n"
     )
 

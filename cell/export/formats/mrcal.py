@@ -15,6 +15,7 @@ def text(camera: Camera) -> str:
     OpenCV's.
     """
     d = camera.coefficients(LENGTHS, "mrcal")
+    width, height = camera.size_px("mrcal")
     intrinsics = (camera.alpha_px, camera.beta_px, camera.u0_px, camera.v0_px, *d)
     values = ", ".join(repr(float(value)) for value in intrinsics)
     return (
@@ -24,6 +25,6 @@ def text(camera: Camera) -> str:
         f"    'intrinsics': [ {values} ],\n\n"
         f"    'rt_cam_ref': {_IDENTITY},\n"
         f"    'extrinsics': {_IDENTITY}, # what mrcal before 2.5 calls it\n\n"
-        f"    'imagersize': [ {camera.width_px}, {camera.height_px} ],\n"
+        f"    'imagersize': [ {width}, {height} ],\n"
         "}\n"
     )

@@ -19,8 +19,9 @@ def text(camera: Camera) -> str:
     flags = cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | cv2.FILE_STORAGE_FORMAT_YAML
     storage = cv2.FileStorage("camera.yaml", flags)
     storage.writeComment(camera.about)
-    storage.write("image_width", camera.width_px)
-    storage.write("image_height", camera.height_px)
+    if camera.image_size_px is not None:
+        storage.write("image_width", camera.image_size_px[0])
+        storage.write("image_height", camera.image_size_px[1])
     storage.write("camera_matrix", camera_matrix(camera))
     storage.write("distortion_coefficients", np.array([coefficients]).T)
     return str(storage.releaseAndGetString())

@@ -15,10 +15,11 @@ def text(camera: Camera) -> str:
     """
     d = camera.coefficients(tuple(_MODELS), "ros")
     a, b, u, v = camera.alpha_px, camera.beta_px, camera.u0_px, camera.v0_px
+    width, height = camera.size_px("ros")
     lines = [
         f"# {camera.about}",
-        f"image_width: {camera.width_px}",
-        f"image_height: {camera.height_px}",
+        f"image_width: {width}",
+        f"image_height: {height}",
         "camera_name: camera",
         *_matrix("camera_matrix", 3, 3, (a, 0, u, 0, b, v, 0, 0, 1)),
         f"distortion_model: {_MODELS[len(d)]}",
