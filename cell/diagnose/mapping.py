@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
-from calib.discovery.diagnosis import Diagnosis, NamedEffect
+from calib.discovery.diagnosis import Ambiguity, Diagnosis, NamedEffect
 from calib.discovery.start import UNKNOWN_POSE
+from cell.diagnose.separate import Separation
 from cell.files.diagnosis_file import SCHEMA, DiagnosisFile
 
 
-def as_mapping(found: Diagnosis, recording: str) -> dict[str, Any]:
+def as_mapping(
+    found: Diagnosis, recording: str, separations: Sequence[Separation]
+) -> dict[str, Any]:
     """The content of `diagnosis.json`, checked against its model."""
     noise = found.twin.noise
     heard = noise.flange_m < UNKNOWN_POSE[0]
@@ -21,7 +25,10 @@ def as_mapping(found: Diagnosis, recording: str) -> dict[str, Any]:
         "holdout": None if found.proof is None else vars(found.proof),
         "mismatch": [vars(m) for m in found.mismatch],
         "effects": [_effect(e) for e in found.effects],
-        "ambiguous_with": [{**vars(a), "separate_with": None} for a in found.ambiguous_with],
+        "ambiguous_with": [
+            _ambiguity(pair, separation)
+            for pair, separation in zip(found.ambiguous_with, separations, strict=True)
+        ],
         "unexplained": None if found.unexplained is None else vars(found.unexplained),
         "noise": {
             "corner_px": noise.corner_px,
@@ -34,6 +41,11 @@ def as_mapping(found: Diagnosis, recording: str) -> dict[str, Any]:
         "notes": list(found.said),
     }
     return DiagnosisFile.model_validate(content).model_dump(mode="json", by_alias=True)
+
+
+def _ambiguity(pair: Ambiguity, separation: Separation) -> dict[str, Any]:
+    why = f"{pair.why}; {separation.why}"
+    return {**vars(pair), "why": why, "separate_with": separation.file}
 
 
 def _effect(effect: NamedEffect) -> dict[str, Any]:

@@ -31,14 +31,14 @@ def twin_text(found: Diagnosis, recording: Recording) -> str:
     plan = {
         "schema": PLAN_SCHEMA,
         "name": f"{recording.name}-twin",
-        "cell": _cell(found, recording),
+        "cell": twin_cell(found, recording),
         "views": _views(found.views),
     }
     PlanFile.model_validate(plan)
     return yaml_text(plan, comment=_COMMENT)
 
 
-def _cell(found: Diagnosis, recording: Recording) -> dict[str, Any]:
+def twin_cell(found: Diagnosis, recording: Recording) -> dict[str, Any]:
     header = recording.header.as_mapping()
     camera = header["camera"]
     views, model, noise = found.views, found.twin.model, found.twin.noise

@@ -28,6 +28,7 @@ from cell.calibrate import (
 )
 from cell.diagnose.mapping import as_mapping
 from cell.diagnose.prediction import AFTER, BEFORE, write_prediction
+from cell.diagnose.separate import separations
 from cell.diagnose.twin import twin_text
 from cell.errors import BadAnswer, InputError
 from cell.recording import Corners, Recording, frames_as_views, read_frames
@@ -95,9 +96,11 @@ def diagnose_into(
         found = diagnose(views, log=_together(views, ahead), forced=forced)
     except CalibrationError as error:
         raise BadAnswer(f"{recording.path}: {error}") from None
-    mapping = as_mapping(found, recording.name)
+    plans = separations(found, recording)
+    mapping = as_mapping(found, recording.name, plans)
     _write(folder, {DIAGNOSIS: json.dumps(mapping, indent=1) + "\n"})
     _write(folder, {TWIN: twin_text(found, recording)})
+    _write(folder, {plan.file: plan.text for plan in plans if plan.file is not None})
     if ahead is not None:
         rows = np.isin(found.log.frame, ahead.frame)
         write_prediction(folder / BEFORE, found.plain.model, found.log.take(rows))

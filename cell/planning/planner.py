@@ -47,7 +47,7 @@ class PlanSize:
 
 
 @dataclass(frozen=True)
-class _Candidate:
+class Candidate:
     station: str
     distance_m: float
     base_from_flange: FloatArray
@@ -86,8 +86,8 @@ def design_plan(
             f" {cell.layout.distances_m[0]} and {cell.layout.distances_m[1]} m. Check layout,"
             " workspace and keep_out, or move the board."
         )
-    tour = _tour(candidates, np.radians(cell.layout.home_deg), guard)
-    views = [_view(number, *stop) for number, stop in enumerate(tour)]
+    stops = _tour(candidates, np.radians(cell.layout.home_deg), guard)
+    views = [view_of(number, *stop) for number, stop in enumerate(stops)]
     plan: dict[str, object] = {"schema": SCHEMA, "name": cell.name, "views": views}
     plan["cell"] = cell_path or cell
     if cell.camera.focus == "auto":
@@ -95,48 +95,48 @@ def design_plan(
     return PlanFile.model_validate(plan)
 
 
-def _view(number: int, candidate: _Candidate, joints_rad: FloatArray) -> dict[str, object]:
+def view_of(number: int, candidate: Candidate, joints_rad: FloatArray) -> dict[str, object]:
     degrees = [round(value, 4) for value in np.degrees(joints_rad).tolist()]
     name = f"{candidate.station} {number:02d}, {candidate.distance_m:.2f} m"
     return {"name": name, "station": candidate.station, "joints_deg": degrees}
 
 
-def _parallel(cell: CellFile, layout: Layout, guard: Guard, size: PlanSize) -> Iterator[_Candidate]:
+def _parallel(cell: CellFile, layout: Layout, guard: Guard, size: PlanSize) -> Iterator[Candidate]:
     sight = Sight.of(cell)
     for distance in np.linspace(*layout.distances_m, size.parallel):
-        candidates = _reachable("parallel", parallel(sight, distance), cell, layout, guard)
+        candidates = reachable("parallel", parallel(sight, distance), cell, layout, guard)
         yield from islice(candidates, 1)
 
 
-def _varied(cell: CellFile, layout: Layout, guard: Guard, size: PlanSize) -> Iterator[_Candidate]:
+def _varied(cell: CellFile, layout: Layout, guard: Guard, size: PlanSize) -> Iterator[Candidate]:
     views = varied(Sight.of(cell), layout.distances_m, size.seed, by_hand=size.by_hand)
     tries = islice(views, _TRIES_PER_VIEW * size.varied)
-    yield from islice(_reachable("varied", tries, cell, layout, guard), size.varied)
+    yield from islice(reachable("varied", tries, cell, layout, guard), size.varied)
 
 
-def _reachable(
+def reachable(
     station: str,
     sights: Iterable[RigidTransform],
     cell: CellFile,
     layout: Layout,
     guard: Guard,
-) -> Iterator[_Candidate]:
+) -> Iterator[Candidate]:
     fixed, mounted = layout.fixed.transform(), layout.mounted.transform()
     home = np.radians(layout.home_deg)
     for camera_from_board in sights:
         middle = camera_from_board.inv() if cell.mount == "eye_in_hand" else camera_from_board
         pose = (fixed * middle * mounted.inv()).as_matrix()
-        if any(_free(guard, joints, joints) for joints in _branches(pose, home, home, guard)):
+        if any(free(guard, joints, joints) for joints in _branches(pose, home, home, guard)):
             centre = camera_from_board.apply(cell.board.board().corners_m.mean(axis=0))
-            yield _Candidate(station, float(centre[2]), pose)
+            yield Candidate(station, float(centre[2]), pose)
 
 
 def _tour(
-    candidates: list[_Candidate], home_rad: FloatArray, guard: Guard
-) -> list[tuple[_Candidate, FloatArray]]:
+    candidates: list[Candidate], home_rad: FloatArray, guard: Guard
+) -> list[tuple[Candidate, FloatArray]]:
     """Always on to the nearest view that a free joint move leads to; others are left out."""
     left, here = list(candidates), home_rad
-    tour: list[tuple[_Candidate, FloatArray]] = []
+    tour: list[tuple[Candidate, FloatArray]] = []
     while left:
         step = _nearest(left, here, home_rad, guard)
         if step is None:
@@ -148,15 +148,15 @@ def _tour(
 
 
 def _nearest(
-    candidates: list[_Candidate], here: FloatArray, home: FloatArray, guard: Guard
-) -> tuple[_Candidate, FloatArray] | None:
+    candidates: list[Candidate], here: FloatArray, home: FloatArray, guard: Guard
+) -> tuple[Candidate, FloatArray] | None:
     steps = [
         (float(np.abs(joints - here).max()), number, joints)
         for number, candidate in enumerate(candidates)
         for joints in _branches(candidate.base_from_flange, here, home, guard)
     ]
     for _, number, joints in sorted(steps, key=lambda step: step[:2]):
-        if _free(guard, here, joints):
+        if free(guard, here, joints):
             return candidates[number], joints
     return None
 
@@ -167,7 +167,7 @@ def _branches(pose: FloatArray, here: FloatArray, home: FloatArray, guard: Guard
     return np.asarray(branches[(np.abs(branches - home) <= _FROM_HOME_RAD).all(axis=1)])
 
 
-def _free(guard: Guard, here: FloatArray, there: FloatArray) -> bool:
+def free(guard: Guard, here: FloatArray, there: FloatArray) -> bool:
     try:
         guard.check_move(here, there, "")
     except SafetyError:
