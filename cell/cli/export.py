@@ -38,9 +38,10 @@ def export(
     from cell.export.place import calibration_file
 
     path = calibration_file(calibration)
+    source = read_calibration(path)
     try:
         exported = export_calibration(
-            read_calibration(path),
+            source,
             tool,
             distance_m=distance,
             solution=solution,

@@ -149,6 +149,12 @@ def test_the_verb_prints_the_file_writes_it_or_wraps_it_in_json(tmp_path: Path) 
     assert out.read_text() == printed.stdout == wrapped["text"]
 
 
+def test_a_missing_file_is_named_once(tmp_path: Path) -> None:
+    path = tmp_path / "nothing.json"
+    refused = CliRunner().invoke(app, ["export", str(path), "--format", "ros"])
+    assert str(refused.exception).count(str(path)) == 1
+
+
 def test_the_verb_tells_the_file_in_its_refusals(tmp_path: Path) -> None:
     path = write(tmp_path, MOVING)
     for arguments, words in (
