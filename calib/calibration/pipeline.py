@@ -6,6 +6,7 @@ import numpy as np
 
 from calib.calibration.baseline import Baseline, fit_baseline, fit_subset
 from calib.calibration.frames import usable_frames
+from calib.calibration.joint_lens import FURTHER_NAMES
 from calib.calibration.paper_method import PaperResult, board_depth_m, run_paper_method
 from calib.calibration.result import VALUES, Calibration, PositionError, Solution
 from calib.calibration.robot import RobotFit, fit_robot, hand_eye_of
@@ -122,12 +123,13 @@ def joint_solution(views: Views, baseline: Baseline, robot: RobotFit, joint: Joi
     at = float(np.median(board_depth_m(views, fit.camera_from_board)[robot.taken]))
     law = robot.reference.law
     middle = np.argmin(np.abs(state.distance_m - at))
+    further = [u.name for u in joint.unknowns if u.name in FURTHER_NAMES]
     return Solution(
         optics=fit.optics,
         camera_from_board=fit.camera_from_board,
         residual_px=np.where(baseline.weight[..., None] > 0, fit.residual_px, np.nan),
-        values={name: float(state.optics[middle, COLUMN[name]]) for name in VALUES},
-        sigma={u.name: joint.sigma(u.name) for u in joint.unknowns if u.name in VALUES},
+        values={name: float(state.optics[middle, COLUMN[name]]) for name in (*VALUES, *further)},
+        sigma={u.name: joint.sigma(u.name) for u in joint.unknowns if u.name in COLUMN},
         at_distance_m=None if law is None else float(state.distance_m[middle]),
         focus=joint_focus(joint, law),
         covariance=joint_covariance(joint, law),

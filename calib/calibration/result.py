@@ -85,7 +85,7 @@ class Solution:
     at_distance_m:
         Distance at which alpha and beta are told where they move, else None.
     values:
-        The numbers of `VALUES`.
+        The numbers of `VALUES`, and further distortion terms that the fit freed (`p1`, `p2`, `k3`).
     focus:
         How alpha and beta move with distance where this solution's own fit tells, else None.
     covariance:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calib.calibration.joint_lens import with_deserved_terms
 from calib.calibration.result import VALUES, RobotReference
 from calib.chain.effects import make_effect
 from calib.chain.model import CellModel, walk
@@ -87,6 +88,7 @@ def fit_robot(
     plain = CellModel(_without_skew(optics), hand.flange_from_mounted, hand.base_from_fixed)
     try:
         law, joint, gain = _best_lens(plain, chosen, noise)
+        joint = with_deserved_terms(joint, chosen)
     except np.linalg.LinAlgError:
         return RobotFit(_from_hand_eye(hand, sigma_px, outliers), None, taken)
     if not _plausible(joint, plain):

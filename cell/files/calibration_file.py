@@ -148,6 +148,10 @@ class SolutionPart(_Part):
     skew_px: float
     k1: float
     k2: float
+    p1: float = 0.0
+    """Decentering and the third radial term: given where the pictures deserve them."""
+    p2: float = 0.0
+    k3: float = 0.0
     at_distance_m: float | None
     """Where alpha and beta move with distance: the distance they are told at."""
     focus: FocusPart | None = None
