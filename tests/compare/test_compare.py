@@ -26,15 +26,21 @@ from tests.paper.scene import mixed_scene
 
 
 @cache
-def _content(seed: int, k_px_m2: float = 0.0) -> str:
+def _content(seed: int, k_px_m2: float = 0.0, mount: str = "eye_in_hand") -> str:
     true = mixed_scene(
-        seed=seed, noise_px=0.1, robot_mm=0.03, robot_deg=0.003, k_px_m2=k_px_m2, k1=-0.05
+        seed=seed,
+        noise_px=0.1,
+        robot_mm=0.03,
+        robot_deg=0.003,
+        k_px_m2=k_px_m2,
+        k1=-0.05,
+        mount=mount,
     )
     return json.dumps(as_mapping(calibrate(true.views), f"run {seed}"))
 
 
-def _calibrated(seed: int, k_px_m2: float = 0.0) -> Side:
-    content = CalibrationSource.model_validate_json(_content(seed, k_px_m2))
+def _calibrated(seed: int, k_px_m2: float = 0.0, mount: str = "eye_in_hand") -> Side:
+    content = CalibrationSource.model_validate_json(_content(seed, k_px_m2, mount))
     return side_of(content, f"run {seed}")
 
 
@@ -57,6 +63,15 @@ def test_two_runs_of_a_breathing_camera_agree_too() -> None:
     found = compare(_calibrated(1, 50.0), _calibrated(2, 50.0))
     assert found.a.law == "inverse_square"
     assert found.camera.beyond_chance is False
+
+
+def test_a_fixed_camera_is_compared_in_the_robot_s_base() -> None:
+    found = compare(*(_calibrated(seed, mount="eye_to_hand") for seed in (1, 2)))
+    assert found.a.place_name == "base_from_camera"
+    assert found.a.correlated
+    assert (np.diag(found.a.covariance)[8:] > 0).all()
+    assert found.mounted is not None
+    assert found.mounted.beyond_chance is False
 
 
 def _moved(side: Side, **changes: float) -> Side:
