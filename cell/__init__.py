@@ -1,1 +1,7 @@
 """The operator's side: command line, plans, sequencer, recording, report."""
+
+import os
+
+# The matrices here are small. Threads of the linear algebra library only wait for each other, a
+# hundred times longer than the work takes where another process wants the cores too.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
