@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calib.calibration.identifiability import Weakness
 from calib.calibration.result import (
     Calibration,
     Covariance,
@@ -51,7 +52,17 @@ def as_mapping(calibration: Calibration, recording: str) -> dict[str, Any]:
         "solutions": {name: _solution(c, name) for name in c.solutions},
         **_transforms(c.robot),
         "robot": None if c.robot is None else _robot(c.robot),
+        "not_separable": [_weakness(w) for w in c.weaknesses],
         "missing": dict(c.missing),
+    }
+
+
+def _weakness(weakness: Weakness) -> dict[str, Any]:
+    return {
+        "quantities": list(weakness.quantities),
+        "inflation": weakness.inflation,
+        "separate_with": weakness.views,
+        "gain": weakness.gain,
     }
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from calib.calibration.baseline import Baseline, fit_baseline, fit_subset
 from calib.calibration.frames import usable_frames
+from calib.calibration.identifiability import Weakness, find_weaknesses
 from calib.calibration.joint_lens import FURTHER_NAMES
 from calib.calibration.paper_method import PaperResult, board_depth_m, run_paper_method
 from calib.calibration.result import VALUES, Calibration, PositionError, Solution
@@ -72,7 +73,14 @@ def calibrate(views: Views) -> Calibration:
         missing=missing,
         image_size_px=(views.width_px, views.height_px),
         distance_range_m=_distance_range_m(views, solutions.get("joint_ml", baseline.mle)),
+        weaknesses=_weaknesses(views, robot),
     )
+
+
+def _weaknesses(views: Views, robot: RobotFit | None) -> tuple[Weakness, ...]:
+    if robot is None or robot.joint is None:
+        return ()
+    return find_weaknesses(robot.joint, views.take(robot.taken))
 
 
 def _distance_range_m(views: Views, solution: Solution) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.calibration.identifiability import Weakness
 from calib.handeye import HandEye, chain
 from calib.paper.focus_law import FocusLaw, FocusLawChoice, Parameter
 from calib.paper.scale_factors import ScaleFactor
@@ -194,6 +195,8 @@ class Calibration:
         (width, height).
     distance_range_m:
         Nearest and farthest depth of the board's centre in the frames used.
+    weaknesses:
+        What the views of the joint fit cannot separate, and which views would.
     """
 
     frame: np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -209,3 +212,4 @@ class Calibration:
     missing: Mapping[str, str]
     image_size_px: tuple[int, int]
     distance_range_m: tuple[float, float]
+    weaknesses: tuple[Weakness, ...] = ()

@@ -79,7 +79,7 @@ def linear_homography(plane_m: FloatArray, image_px: FloatArray) -> FloatArray:
             np.hstack([zero, ones, -q[:, 1:] * ones]),
         ]
     )
-    _, singular, vt = np.linalg.svd(rows, full_matrices=True)
+    _, singular, vt = np.linalg.svd(rows, full_matrices=len(rows) < 9)
     if singular[7] < 1e-9 * singular[0]:
         raise CalibrationError("the corners seen lie on a line and fix no homography")
     matrix = np.linalg.inv(to_image) @ vt[8].reshape(3, 3) @ to_plane

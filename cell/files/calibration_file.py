@@ -185,6 +185,18 @@ class RobotPart(_Part):
     """Frames whose logged pose disagrees with their picture."""
 
 
+class NotSeparable(_Part):
+    """Quantities that the views see nearly only together."""
+
+    quantities: tuple[str, ...]
+    inflation: PositiveFloat
+    """How many times worse the combination is known than its members would be, each alone."""
+    separate_with: str
+    """Views that would tell them apart."""
+    gain: PositiveFloat
+    """By what factor four such views lower the combination's uncertainty."""
+
+
 class CalibrationFile(_Part):
     """The whole of `calibration.json`; metres, radians, pixels."""
 
@@ -216,5 +228,7 @@ class CalibrationFile(_Part):
     base_from_camera: TransformPart | None
     """With a fixed camera: the camera in the base."""
     robot: RobotPart | None
+    not_separable: tuple[NotSeparable, ...] = ()
+    """What the views of the joint fit cannot tell apart, the worst first."""
     missing: dict[str, str]
     """What could not be known, and why."""
