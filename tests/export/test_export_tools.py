@@ -143,7 +143,7 @@ def mrcals() -> list[Path]:
 def new_mrcal(mrcals: list[Path]) -> Path:
     """PyPI's, which reads other programs' files, too."""
     if MRCAL not in mrcals:
-        pytest.skip("mrcal 2.5 is not installed: run tools/install-mrcal (needs Python 3.12)")
+        pytest.skip("mrcal is not installed from PyPI: run tools/install-mrcal")
     return MRCAL
 
 
