@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -13,8 +14,11 @@ from calib.chain.kinematics import arm
 from calib.chain.model import CellModel
 from calib.chain.optics import optics_row
 from calib.chain.rigid import compose, inverse
+from calib.discovery.design.information import shown
 from calib.solver.noise import Noise
 from calib.views import Board, FloatArray, Views
+from cell.recording import Recording
+from cell.recording.header import Header, board_file
 from sim.arm import Repeatability
 from sim.cell import CameraSpec, SimulatedCell
 from sim.log import tour
@@ -81,8 +85,6 @@ def joints(frames: int, seed: int) -> FloatArray:
 
 
 def _whole(cell: CellModel, base_from_flange: FloatArray) -> bool:
-    from calib.discovery.design.information import shown
-
     blank = Views.blank(BOARD, width_px=WIDTH, height_px=HEIGHT, frames=1)
     views = replace(blank, base_from_flange=base_from_flange[None])
     return bool(shown(cell, views).seen.all())
@@ -108,3 +110,16 @@ def record(model: CellModel, views: Views, seed: int, noise: Noise = NOISE) -> V
         corner_rng=rng,
     )
     return made.take(np.asarray(made.seen.any(axis=1)))
+
+
+def recording() -> Recording:
+    """What a recording of these runs tells of itself; it has no files."""
+    header = Header.model_validate(
+        {
+            "schema": "cell.recording/1",
+            "robot": {"model": "ur5e"},
+            "camera": {"width": WIDTH, "height": HEIGHT},
+            "board": board_file(BOARD).model_dump(),
+        }
+    )
+    return Recording(Path("bench"), header, ())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -14,22 +13,9 @@ from calib.discovery.diagnose import diagnose
 from calib.discovery.diagnosis import Ambiguity
 from cell.diagnose.separate import POSES, separations
 from cell.files.plan_file import read_plan
-from cell.recording.header import Header, board_file
 from cell.sequencer.guard import Guard
 from cell.simulated import home_of, log_of, simulated_cell
-from tests.discovery.simulated_runs import BOARD, HEIGHT, WIDTH, log, plain_cell, record
-
-RECORDING = SimpleNamespace(
-    name="bench",
-    header=Header.model_validate(
-        {
-            "schema": "cell.recording/1",
-            "robot": {"model": "ur5e"},
-            "camera": {"width": WIDTH, "height": HEIGHT},
-            "board": board_file(BOARD).model_dump(),
-        }
-    ),
-)
+from tests.discovery.simulated_runs import log, plain_cell, record, recording
 
 
 def undecided(present: Present, rival: str):
@@ -58,7 +44,7 @@ def strength(found, more):
 
 
 def test_the_plan_is_worth_more_than_twice_as_many_random_views(tmp_path):
-    (made,) = separations(COMPLIANCE, RECORDING)
+    (made,) = separations(COMPLIANCE, recording())
     assert made.file == "separate-joint_compliance-joint_zero_offset.plan.yaml"
     path = tmp_path / made.file
     path.write_text(made.text)
@@ -80,7 +66,7 @@ def test_the_plan_is_worth_more_than_twice_as_many_random_views(tmp_path):
 
 
 def test_the_arm_stays_where_it_has_been(tmp_path):
-    (made,) = separations(COMPLIANCE, RECORDING)
+    (made,) = separations(COMPLIANCE, recording())
     path = tmp_path / "made.plan.yaml"
     path.write_text(made.text)
     plan = read_plan(path)
@@ -97,13 +83,13 @@ def test_no_plan_is_given_where_no_poses_can():
     found = undecided(
         make_effect("entrance_pupil_shift", {"pupil_m_rad2": 3e-3}), "protective_window"
     )
-    (made,) = separations(found, RECORDING)
+    (made,) = separations(found, recording())
     assert made.file is None
     assert "no plan of poses decides it" in made.why
 
 
 def test_no_plan_is_given_for_an_arm_that_nobody_knows():
     found = replace(COMPLIANCE, views=replace(COMPLIANCE.views, robot_model=None))
-    (made,) = separations(found, RECORDING)
+    (made,) = separations(found, recording())
     assert made.file is None
     assert "model is not known" in made.why

@@ -79,6 +79,10 @@ def find_offset(views: Views, log: Views, loop: FloatArray) -> Slip | None:
     )
 
 
+_MUTUAL = 4.0
+"""Two odd frames that fit each other's poses best vouch for one another: so much more may miss."""
+
+
 @dataclass(frozen=True)
 class OddFrames:
     """Frames whose pose cannot be theirs.
@@ -106,11 +110,12 @@ def find_odd_frames(views: Views, loop: FloatArray) -> OddFrames:
     index = np.arange(len(views), dtype=np.float64)
     expected = _expected(closure, loop)
     rows = np.flatnonzero(odd)
-    for i in rows:
-        miss = _miss(expected[i], views.base_from_flange[rows], closure)
-        j = int(np.argmin(miss))
-        if miss[j] < 1.0 and rows[j] != i:
-            index[i] = rows[j]
+    miss = np.array([_miss(expected[i], views.base_from_flange[rows], closure) for i in rows])
+    best = miss.argmin(axis=1)
+    for k, i in enumerate(rows):
+        mutual = best[best[k]] == k
+        if miss[k, best[k]] < (_MUTUAL if mutual else 1.0) and best[k] != k:
+            index[i] = rows[best[k]]
     exchanged = [int(i) for i in rows if index[i] != i]
     lost = [i for i in rows if index[i] == i]
     alone = [i for i in lost if not _odd_neighbour(odd, int(i))]
