@@ -26,7 +26,7 @@ CHOSEN = (
 @pytest.mark.skipif(os.geteuid() != 0, reason="all tests already run as an ordinary user")
 @pytest.mark.skipif(shutil.which("setpriv") is None, reason="setpriv (util-linux) is missing")
 def test_no_frame_is_lost_by_an_ordinary_user() -> None:
-    tests = [f"{HERE}/test_gige_faults.py", f"{HERE}/test_conformance.py", "-k", CHOSEN]
+    tests = [f"{HERE}/test_gige_faults.py", f"{HERE}/test_camera_conformance.py", "-k", CHOSEN]
     with tempfile.TemporaryDirectory() as home:
         Path(home).chmod(0o777)
         done = subprocess.run(
