@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,31 +15,50 @@ from cell.cli.progress import run_progress
 from cell.cli.summary import calibration_summary, diagnosis_summary
 from cell.diagnose import diagnose_into
 from cell.errors import BadAnswer
-from cell.factory import real_devices, simulated_devices
-from cell.files.plan_file import read_plan
+from cell.factory import peer_devices, real_devices, simulated_devices
+from cell.files.plan_file import Plan, read_plan
 from cell.recording import Corners, Recording, read_recording, write_corners
 from cell.recording.corners import FILE_NAME as DETECTIONS
+from cell.sequencer.sequencer import Devices
 from cell.sequencer.session import record_plan
 from cell.sequencer.states import Finish, RunResult
 from cell.simulated import home_of, simulated_cell
 
 
-def record(plan_path: Path, folder: Path, *, dry_run: bool, resume: bool) -> RunResult:
+def record(
+    plan_path: Path, folder: Path, *, dry_run: bool, resume: bool, peers: bool = False
+) -> RunResult:
     """Run a plan into a recording, with its progress in the terminal.
+
+    Parameters
+    ----------
+    dry_run, peers:
+        Simulated devices; in this process, or behind the real drivers and their protocols.
 
     Raises
     ------
     InputError, SafetyError
         Plan or cell cannot be used, or a recording is in the way.
+    DeviceError
+        `peers`, and a driver's packages are not installed or the peers do not start.
     """
     plan = read_plan(plan_path)
-    devices = simulated_devices(plan) if dry_run else real_devices(plan)
-    devices_are = "SIMULATED arm and camera" if dry_run else "real arm and camera"
-    say(f"{devices_are}; plan {plan_path}; recording {folder}")
-    with run_progress(simulated=dry_run) as listener:
+    say(f"{_devices_are(dry_run, peers)}; plan {plan_path}; recording {folder}")
+    with _devices(plan, dry_run, peers) as devices, run_progress(simulated=dry_run) as listener:
         return record_plan(
             plan, folder, devices, simulated=dry_run, resume=resume, listener=listener
         )
+
+
+def _devices_are(dry_run: bool, peers: bool) -> str:
+    through = " through the real drivers" if peers else ""
+    return f"SIMULATED arm and camera{through}" if dry_run else "real arm and camera"
+
+
+def _devices(plan: Plan, dry_run: bool, peers: bool) -> AbstractContextManager[Devices]:
+    if peers:
+        return peer_devices(plan)
+    return nullcontext(simulated_devices(plan) if dry_run else real_devices(plan))
 
 
 def truth_of(plan_path: Path) -> CellModel:

@@ -12,7 +12,8 @@ from calib.chain.model import CellModel
 from calib.chain.optics import OPTICS, optics_row
 from calib.views import FloatArray, Views
 from cell.errors import InputError
-from cell.files.cell_file import CellFile, EffectFile, Lens, Simulation
+from cell.files.camera_file import Lens
+from cell.files.cell_file import CellFile, EffectFile, Simulation
 from cell.files.plan_file import Plan
 from cell.log_slips import SLIPS
 from cell.sequencer.guard import Guard

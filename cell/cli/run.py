@@ -18,6 +18,14 @@ def run(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Simulated arm and camera in place of the real ones.")
     ] = False,
+    peers: Annotated[
+        bool,
+        typer.Option(
+            "--peers",
+            help="With --dry-run: through the real drivers, to simulated devices that speak the"
+            " real ones' protocols on loopback. Takes as long as a real run.",
+        ),
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder of the recording and results.")
     ] = None,
@@ -32,9 +40,11 @@ def run(
     """Move, grab and log every view of a plan, then calibrate, diagnose and report."""
     from cell.run import Outcome, evaluate, record, truth_of
 
+    if peers and not dry_run:
+        raise InputError("--peers goes with --dry-run: cell run PLAN.yaml --dry-run --peers")
     path = _plan_path(plan, dry_run)
     folder = _folder(path, output, resume)
-    result = record(path, folder, dry_run=dry_run, resume=resume)
+    result = record(path, folder, dry_run=dry_run, resume=resume, peers=peers)
     outcome = Outcome.of(result, folder)
     for view, reason in result.skipped.items():
         say(f"skipped view {view}: {reason}")

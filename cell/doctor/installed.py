@@ -7,7 +7,8 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 
 from cell.doctor.finding import Finding
-from cell.files.cell_file import CellFile, GigeCamera
+from cell.files.camera_file import GigeCamera
+from cell.files.cell_file import CellFile
 from drivers.aravis_network import receive_buffer_hint, receive_buffer_limit_bytes
 
 _ALWAYS = (

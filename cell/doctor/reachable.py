@@ -7,14 +7,8 @@ import struct
 from pathlib import Path
 
 from cell.doctor.finding import Finding
-from cell.files.cell_file import (
-    AbbRobot,
-    CellFile,
-    GenicamCamera,
-    GigeCamera,
-    RobotiqCamera,
-    UniversalRobot,
-)
+from cell.files.camera_file import GenicamCamera, GigeCamera, RobotiqCamera
+from cell.files.cell_file import AbbRobot, CellFile, UniversalRobot
 from drivers.aravis_network import GVCP_PORT, packet_bytes_for
 from drivers.errors import DeviceUnreachable
 

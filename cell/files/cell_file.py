@@ -9,9 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import ConfigDict, Field, PositiveInt
+from pydantic import ConfigDict, Field
 
 from calib.views import Mount
+from cell.files.camera_file import CameraFile
 from cell.files.parts import Box, Finite, Joints, Part, Pose, Positive
 from cell.files.yaml_model import read_model
 from cell.recording.header import Charuco, Chessboard
@@ -69,62 +70,6 @@ class AbbRobot(SimulatedRobot):
 
 
 RobotFile = Annotated[SimulatedRobot | UniversalRobot | AbbRobot, Field(discriminator="driver")]
-
-
-class Lens(Part):
-    """The lens, as its barrel says."""
-
-    focal_length_mm: Positive
-    f_number: Positive = 4.0
-
-
-class SimulatedCamera(Part):
-    """A camera in this process, and what all cameras have in common."""
-
-    driver: Literal["sim"]
-    model: str | None = None
-    width: PositiveInt
-    height: PositiveInt
-    pixel_size_um: Positive | None = None
-    focus: Literal["auto", "manual", "motorised", "fixed"] | None = None
-    lens: Lens | None = None
-
-
-class GigeCamera(SimulatedCamera):
-    """A GigE Vision camera, through Aravis."""
-
-    driver: Literal["gige"]  # type: ignore[assignment]
-    address: str
-    """IP address of the camera."""
-    pixel_format: str = "Mono8"
-    features: dict[str, str | float | int | bool] = Field(default_factory=dict)
-    """GenICam features to set once at start, by name."""
-
-
-class GenicamCamera(SimulatedCamera):
-    """A camera behind a GenTL producer (CoaXPress grabbers), through harvesters."""
-
-    driver: Literal["genicam"]  # type: ignore[assignment]
-    producer: Path
-    """The vendor's .cti file."""
-    serial: str | None = None
-    """Serial number; the first camera found where it is not given."""
-    pixel_format: str = "Mono8"
-    features: dict[str, str | float | int | bool] = Field(default_factory=dict)
-    """GenICam features to set once at start, by name."""
-
-
-class RobotiqCamera(SimulatedCamera):
-    """A Robotiq wrist camera, over HTTP."""
-
-    driver: Literal["robotiq"]  # type: ignore[assignment]
-    address: str
-    """The robot's address, with `:port` where it is not 4242."""
-
-
-CameraFile = Annotated[
-    SimulatedCamera | GigeCamera | GenicamCamera | RobotiqCamera, Field(discriminator="driver")
-]
 
 
 class Layout(Part):

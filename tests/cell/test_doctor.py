@@ -13,6 +13,8 @@ from cell.doctor.finding import Finding
 from cell.factory import arm_of, camera_of
 from cell.files.cell_file import CellFile, read_cell
 from drivers.abb import ABBArm
+from drivers.aravis import AravisCamera
+from drivers.genicam_settings import FeatureNames
 from drivers.robotiq import RobotiqCamera
 from drivers.ur import URArm
 from tests.cell.plans import CELL
@@ -126,3 +128,24 @@ def test_the_driver_follows_the_cell_file(tmp_path: Path) -> None:
     assert isinstance(arm_of(ur), URArm)
     assert isinstance(arm_of(abb), ABBArm)
     assert isinstance(camera_of(abb), RobotiqCamera)
+
+
+def test_what_the_file_says_of_a_camera_reaches_its_driver(tmp_path: Path) -> None:
+    names = "{gain: DigitalGain, gain_is_factor: true, focus_position: Stepper}"
+    gige = camera_of(
+        cell_with(
+            tmp_path,
+            camera="{driver: gige, address: 10.0.0.1, packet_bytes: 1500, software_trigger: false,"
+            f" feature_names: {names}",
+        )
+    )
+    assert isinstance(gige, AravisCamera)
+    assert gige.options.names.gain == ("DigitalGain",)
+    assert gige.options.names.exposure == FeatureNames().exposure
+    assert gige.options.focus_names.position == "Stepper"
+    assert (gige.options.software_trigger, gige._packet_bytes) == (False, 1500)
+    robotiq = camera_of(
+        cell_with(tmp_path, camera="{driver: robotiq, address: 10.0.0.1, display_size: [640, 480]")
+    )
+    assert isinstance(robotiq, RobotiqCamera)
+    assert robotiq._display_size == (640, 480)
