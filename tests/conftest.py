@@ -4,6 +4,7 @@ could run it."""
 from __future__ import annotations
 
 import os
+import platform
 from collections.abc import Generator
 
 import pytest
@@ -14,6 +15,7 @@ MAY_SKIP = (
     "setpriv (util-linux) is missing",
     # the installer ran before and found neither a Python for it nor PyPI
     "mrcal is not installed",
+    *(() if platform.machine() == "x86_64" else ("pycolmap has no wheel for this machine",)),
 )
 """How the reasons of those tests begin that may be skipped even so."""
 
