@@ -5,8 +5,11 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: run test lint types layers check setup clean
-setup: $(STAMP)
+.PHONY: help run test lint types layers setup clean
+setup: $(STAMP)  ## install into .venv
+
+help:  ## this list
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST)
 
 $(STAMP): pyproject.toml tools/install-debian-packages
 	tools/install-debian-packages
@@ -15,22 +18,22 @@ $(STAMP): pyproject.toml tools/install-debian-packages
 	$(BIN)/python -m pip install --quiet -e '.[dev,ur,abb,genicam]'
 	touch $@
 
-run: $(STAMP)
+run: $(STAMP)  ## the paper's larger cell, simulated, with its report
 	$(BIN)/cell run --dry-run
 
-test: $(STAMP) lint types layers
+test: $(STAMP) lint types layers  ## lint, types, layers and every test
 	tools/install-mrcal
 	$(BIN)/python -m pytest -n 2
 
-lint: $(STAMP)
+lint: $(STAMP)  ## ruff, its rules and its format
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(STAMP)
+types: $(STAMP)  ## mypy, strict
 	$(BIN)/mypy
 
-layers: $(STAMP)
+layers: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
 
-clean:
+clean:  ## remove .venv
 	rm -rf $(VENV)

@@ -15,16 +15,10 @@ from scipy.spatial.transform import Rotation
 
 from calib.chain import rigid
 from calib.chain.kinematics import UnknownArm, arm
+from calib.discovery.bookkeeping.slip import ROBOT_COLUMNS
 from calib.views import FloatArray, Views
 from cell.errors import InputError
 from cell.files.cell_file import EffectFile
-
-_ROBOT_COLUMNS = (
-    "base_from_flange",
-    "joints_rad",
-    "joint_velocity_rad_s",
-    "approach_joints_rad",
-)
 
 
 def slip(views: Views, effect: EffectFile, rng: np.random.Generator) -> Views:
@@ -50,7 +44,7 @@ def _swap(views: Views, effect: EffectFile, rng: np.random.Generator) -> Views:
 
 
 def _paired(views: Views, rows: NDArray[np.int64]) -> Views:
-    return replace(views, **{name: getattr(views, name)[rows] for name in _ROBOT_COLUMNS})
+    return replace(views, **{name: getattr(views, name)[rows] for name in ROBOT_COLUMNS})
 
 
 def _unit(views: Views, effect: EffectFile, rng: np.random.Generator) -> Views:
