@@ -66,8 +66,10 @@ def separations(found: Diagnosis, recording: Recording) -> tuple[Separation, ...
     if not found.ambiguous_with:
         return ()
     kinematics = kinematics_of(found.views)
-    if kinematics is None or not found.views.has_pose.all():
-        none = Separation(None, "", "the arm's model is not known, so no poses can be checked")
+    if kinematics is None or not np.isfinite(found.views.joints_rad).all():
+        none = Separation(
+            None, "", "the arm's model or its joints are not known, so no poses can be checked"
+        )
         return (none,) * len(found.ambiguous_with)
     cell = _cell(found, recording, kinematics)
     guard = Guard(cell, speed_m_s=0.1, joint_speed_rad_s=0.5)

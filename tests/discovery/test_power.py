@@ -104,3 +104,12 @@ def test_the_verb_tells_it_of_a_cell_and_of_a_plan():
     text = run(app, ["plan", "--power", str(CONFIGS / "ur3-robotiq.plan.yaml")])
     assert text.exit_code == 0
     assert "could not be told apart" in text.stdout
+
+
+def test_a_cell_that_tells_nothing_of_its_layout_is_refused_in_words(tmp_path):
+    whole = (CONFIGS / "ur3-robotiq.cell.yaml").read_text()
+    path = tmp_path / "bare.cell.yaml"
+    path.write_text(whole[: whole.index("layout:")])
+    result = CliRunner().invoke(app, ["plan", "--power", str(path)])
+    assert result.exit_code != 0
+    assert "layout" in str(result.exception)

@@ -92,4 +92,4 @@ def test_no_plan_is_given_for_an_arm_that_nobody_knows():
     found = replace(COMPLIANCE, views=replace(COMPLIANCE.views, robot_model=None))
     (made,) = separations(found, recording())
     assert made.file is None
-    assert "model is not known" in made.why
+    assert "no poses can be checked" in made.why
