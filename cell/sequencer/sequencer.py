@@ -27,10 +27,11 @@ from cell.sequencer.shot import Shot
 from cell.sequencer.states import RunResult, State, Status, finish_of
 from cell.sequencer.stop import StopRequest
 from cell.sequencer.watched_arm import WatchedArm, joints_of
+from cell.sequencer.watched_camera import CameraLost, asked_of_camera
 from cell.sequencer.worker import Worker
 from drivers.arm import Arm, ArmState
 from drivers.camera import Camera, FocusSetting, Frame
-from drivers.errors import FrameLost
+from drivers.errors import FrameLost, StopFailed
 
 _LAST_FRAME_S = 30.0
 
@@ -175,19 +176,29 @@ class Sequencer:
         return came_from
 
     def _shoot(self, index: int, came_from: FloatArray) -> Shot | None:
-        """Focus and grab until image and pose belong together; None where the view is given up."""
+        """Focus and grab until image and pose belong together; None where the view is given up.
+
+        A camera that is lost is opened anew, once a view, with the arm stopped before.
+        """
         exposure = self._plan.file.exposure
         focus = partial(self._camera.focus, FocusSetting(exposure.focus, exposure.focus_position))
+        reopened = False
         while True:
             try:
                 self._tell(State.FOCUSING)
-                self._arm.await_job(self._worker.do(focus))
+                self._arm.await_job(self._worker.do(asked_of_camera(focus)))
                 self._tell(State.GRABBING)
                 frame, states = self._grab(exposure.timeout_s)
                 shot = Shot(index, frame, states, tuple(came_from.tolist()))
                 fault = shot.pose_fault(self._plan.file.checks)
             except FrameLost as lost:
                 fault = str(lost)
+            except CameraLost as lost:
+                if reopened:
+                    raise
+                self._reopen_camera(index, lost)
+                reopened = True
+                continue
             if fault is None:
                 return shot
             if not self._again(index, fault):
@@ -196,9 +207,21 @@ class Sequencer:
     def _grab(self, timeout_s: float) -> tuple[Frame, tuple[ArmState, ...]]:
         """A frame, and the arm's readings from before its trigger to after it came."""
         states = [self._arm.watch()]
-        frame = self._arm.await_job(self._worker.do(partial(self._camera.grab, timeout_s)), states)
+        grab = asked_of_camera(partial(self._camera.grab, timeout_s))
+        frame = self._arm.await_job(self._worker.do(grab), states)
         states.append(self._arm.reading_after(frame.host_t_s))
         return frame, tuple(states)
+
+    def _reopen_camera(self, index: int, lost: CameraLost) -> None:
+        """Stop the arm, then open the camera anew; raises `DeviceError` where it stays away."""
+        try:
+            self._arm.arm.stop()
+        except StopFailed:
+            raise lost from None  # the run ends, which stops the arm again and says what failed
+        self._journal.write("camera lost", view=index, reason=str(lost))
+        self._tell(self._state, f"{self._view}: {lost}; opening the camera once more")
+        self._arm.await_job(self._worker.do(self._camera.connect))
+        self._arm.settle(self._plan.file.settle, self._plan.where(index))
 
     # -- checking and logging, while the arm goes on -----------------------------------------
 

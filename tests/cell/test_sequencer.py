@@ -22,6 +22,7 @@ from cell.sequencer.progress import Progress
 from cell.sequencer.sequencer import Devices, Sequencer
 from cell.sequencer.states import Finish, RunResult, State, Status
 from cell.sequencer.stop import StopRequest, signals_ask
+from drivers.arm import ArmState
 from drivers.camera import Frame
 from drivers.errors import DeviceUnreachable, FrameLost, StopFailed
 from tests.cell.fakes import FakeArm, FakeCamera, FastClock
@@ -113,17 +114,60 @@ def test_moves_stay_below_the_plans_speed(bench: Bench) -> None:
 
 
 def test_a_camera_that_dies_stops_the_arm_first(bench: Bench) -> None:
-    bench.camera.grabs = [None, DeviceUnreachable("camera at 10.0.0.2 does not answer")]
+    bench.camera.grabs = [None, *[DeviceUnreachable("camera at 10.0.0.2 does not answer")] * 2]
     order: list[str] = []
     bench.arm.stop, arm_stop = lambda: (order.append("arm stop"), arm_stop()), bench.arm.stop  # type: ignore
     bench.camera.close = lambda: order.append("camera close")  # type: ignore[method-assign]
     result = bench.run()
-    assert order == ["arm stop", "camera close"]
+    assert order == ["arm stop", "arm stop", "camera close"]
     assert result.finish is Finish.DEVICE_FAILED
     assert result.finish.exit_status == EXIT_DEVICE
     assert "10.0.0.2" in result.reason
     assert len(read_recording(bench.folder).frames) == 1
     assert bench.events()[-1] == "stop"
+
+
+def test_a_camera_that_comes_back_is_opened_once_with_the_arm_stopped(bench: Bench) -> None:
+    bench.camera.grabs = [None, DeviceUnreachable("camera at 10.0.0.2 does not answer"), None]
+    order: list[str] = []
+    bench.arm.calls = bench.camera.calls = order
+    result = bench.run()
+    assert (result.finish, result.frames) == (Finish.COMPLETED, 4)
+    lost = order.index("stop")
+    assert order[lost - 1 : lost + 3] == ["grab", "stop", "connect", "grab"]
+    assert order.count("connect") == 3
+    assert order.count("move") == 4
+    assert bench.events().count("camera lost") == 1
+
+
+def test_a_camera_that_stays_away_ends_the_run(bench: Bench) -> None:
+    bench.camera.grabs = [None, DeviceUnreachable("gone")]
+    connect = bench.camera.connect
+
+    def once() -> None:
+        if "connect" in bench.camera.calls:
+            raise DeviceUnreachable("camera at 10.0.0.2 stays away")
+        connect()
+
+    bench.camera.connect = once  # type: ignore[method-assign]
+    result = bench.run()
+    assert result.finish is Finish.DEVICE_FAILED
+    assert "stays away" in result.reason
+    assert len(read_recording(bench.folder).frames) == 1
+
+
+def test_an_arm_that_is_lost_while_the_camera_works_is_not_taken_for_the_camera(
+    bench: Bench,
+) -> None:
+    def gone(setting: object) -> None:
+        def state() -> ArmState:
+            raise DeviceUnreachable("arm at 10.0.0.1 does not answer")
+
+        bench.arm.state = state  # type: ignore[method-assign]
+
+    bench.camera.focus = gone  # type: ignore[method-assign,assignment]
+    assert "10.0.0.1" in bench.run().reason
+    assert bench.camera.calls.count("connect") == 1
 
 
 def test_an_unforeseen_error_stops_the_arm_and_is_raised_again(bench: Bench) -> None:
@@ -143,7 +187,7 @@ def test_a_failing_stop_is_the_loudest_error(
     assert result.finish.exit_status == EXIT_SAFETY
     assert "PRESS THE EMERGENCY STOP" in capsys.readouterr().err
     assert "gone" in result.reason
-    assert bench.arm.calls.count("stop") == 3
+    assert bench.arm.calls.count("stop") == 1 + 3  # for the camera, and as the run ends
 
 
 def test_a_terminal_that_is_gone_does_not_end_the_run(bench: Bench) -> None:
