@@ -16,7 +16,7 @@ from scipy.stats import chi2
 from calib.chain.rigid import from_vector, inverse
 from calib.views import FloatArray
 from cell.compare.field import Field, aligned_place, differences, field_of, jacobian
-from cell.compare.side import Side
+from cell.compare.side import PLACE, Side
 
 SIGNIFICANT = 0.01
 """Two calibrations of the same camera fall below it once in a hundred times."""
@@ -145,7 +145,7 @@ def _difference(
     map_px = differences(a, b, field, (a.values, b.values), places)
     spread = np.hstack([jacobian(a, b, field, places, k) @ _root((a, b)[k], align) for k in (0, 1)])
     if align:
-        J = jacobian(a, b, field, places, 1)[:, 8:]
+        J = jacobian(a, b, field, places, 1)[:, PLACE]
         spread = spread - J @ np.linalg.lstsq(J, spread, rcond=None)[0]
     shape = (*map_px.shape, spread.shape[1])
     each = spread.reshape(shape)
@@ -159,10 +159,10 @@ def _difference(
 
 
 def _root(side: Side, align: bool) -> FloatArray:
-    """(14, 14) square root of the covariance; without the place where the frames are aligned."""
+    """(P, P) square root of the covariance; without the place where the frames are aligned."""
     covariance = side.covariance.copy()
     if align:
-        covariance[8:], covariance[:, 8:] = 0.0, 0.0
+        covariance[PLACE], covariance[:, PLACE] = 0.0, 0.0
     sigma = np.sqrt(np.diag(covariance))
     scale = np.where(sigma > 0, sigma, 1.0)  # so that pixels and radians weigh alike
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
@@ -220,7 +220,7 @@ def _depth(
         scale = [np.sqrt(np.prod(s.scale_px(v, distance_m))) for s, v in ((a, va), (b, vb))]
         shift = 0.0
         if places is not None:
-            moved = [p @ from_vector(v[8:]) for p, v in zip(places, (va, vb), strict=True)]
+            moved = [p @ from_vector(v[PLACE]) for p, v in zip(places, (va, vb), strict=True)]
             shift = float((inverse(places[0]) @ moved[1])[2, 3])
             shift -= float((inverse(places[0]) @ moved[0])[2, 3])
         return distance_m * float(scale[1] / scale[0] - 1) + shift

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.chain.rigid import from_vector
 from calib.views import FloatArray
-from cell.compare.side import Side
+from cell.compare.side import PLACE, Side
 from cell.errors import InputError
 
 DISTANCES = 4
@@ -65,10 +65,10 @@ def field_of(a: Side, b: Side) -> Field:
 def _rays(side: Side, pixels: FloatArray, distance_m: float) -> FloatArray:
     """(G, 3) directions with z = 1 that the camera sees at these pixels."""
     alpha, beta = side.scale_px(side.values, distance_m)
-    u0, v0, skew, k1, k2 = side.values[3:8]
+    u0, v0, skew, *fitted = side.values[3 : PLACE.start]
     y = (pixels[:, 1] - v0) / beta
     x = (pixels[:, 0] - u0 - skew * y) / alpha
-    coefficients = np.array([k1, k2, *side.more_distortion.values()])
+    coefficients = np.array([*fitted, *side.more_distortion.values()])
     enough = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-14)
     ideal = cv2.undistortPointsIter(
         np.stack([x, y], axis=1)[:, None], np.eye(3), coefficients, np.eye(3), np.eye(3), enough
@@ -105,7 +105,7 @@ def differences(
 def jacobian(
     a: Side, b: Side, field: Field, places: tuple[FloatArray, FloatArray], which: int
 ) -> FloatArray:
-    """(D * G * 2, 14) derivative of `differences` by the numbers of one side (0 or 1)."""
+    """(D * G * 2, P) derivative of `differences` by the numbers of one side (0 or 1)."""
     values, steps = (a.values, b.values), (a, b)[which].steps()
     columns = []
     for k, step in enumerate(steps):
@@ -128,7 +128,7 @@ def aligned_place(a: Side, b: Side, field: Field) -> FloatArray:
     for _ in range(10):
         places = (np.eye(4), place)
         left = differences(a, b, field, (a.values, b.values), places).ravel()
-        J = jacobian(a, b, field, places, 1)[:, 8:]
+        J = jacobian(a, b, field, places, 1)[:, PLACE]
         step: FloatArray = np.asarray(-np.linalg.lstsq(J, left, rcond=None)[0], dtype=np.float64)
         place = place @ from_vector(step)
         if np.abs(step).max() < 1e-12:

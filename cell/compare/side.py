@@ -1,4 +1,4 @@
-"""One of the two calibrations: its camera as fourteen numbers with their covariance."""
+"""One of the two calibrations: its camera as named numbers with their covariance."""
 
 from __future__ import annotations
 
@@ -21,10 +21,16 @@ from cell.export.reading import (
     TransformSource,
 )
 
-OPTICS_NAMES = ("alpha", "beta", "bend", "u0_px", "v0_px", "skew_px", "k1", "k2")
+FITTED_DISTORTION = DISTORTION[:5]
+"""The coefficients that a calibration may free: k1, k2, p1, p2, k3."""
+
+OPTICS_NAMES = ("alpha", "beta", "bend", "u0_px", "v0_px", "skew_px", *FITTED_DISTORTION)
 NAMES = (*OPTICS_NAMES, *(f"mount.{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")))
 """Alpha and beta far away, the focus law's bend, then the camera's place by a small increment in
 its own frame."""
+
+PLACE = slice(len(OPTICS_NAMES), len(NAMES))
+"""Where the increment stands."""
 
 _ALIASES = {
     **dict.fromkeys(("alpha_px", "alpha0_px", "alpha_inf_px"), "alpha"),
@@ -46,11 +52,11 @@ class Side:
     law:
         Of the focal length: a name of `calib.paper.focus_law.LAWS`.
     values, covariance:
-        (14,) and (14, 14) of `NAMES`.
+        (P,) and (P, P) of `NAMES`.
     correlated:
         False where only single sigmas are known.
     more_distortion:
-        Coefficients beyond k1 and k2, held.
+        Coefficients beyond `FITTED_DISTORTION`, held.
     place_name, place:
         `flange_from_camera` or `base_from_camera` and its (4, 4); empty and None where unknown.
     has_corner:
@@ -86,20 +92,20 @@ class Side:
     def optics(self, values: FloatArray, distance_m: float) -> FloatArray:
         """(K,) of the camera focused at a distance."""
         alpha, beta = self.scale_px(values, distance_m)
-        named = dict(zip(OPTICS_NAMES[3:], values[3:8], strict=True))
+        named = dict(zip(OPTICS_NAMES[3:], values[3 : PLACE.start], strict=True))
         return optics_row(alpha_px=alpha, beta_px=beta, **named, **self.more_distortion)
 
     def pixels(
         self, values: FloatArray, points_m: FloatArray, distance_m: float, place: FloatArray
     ) -> FloatArray:
         """(G, 2) of (G, 3) points in the frame that `place` takes the camera to."""
-        camera_from_frame = inverse(place @ from_vector(values[8:]))
+        camera_from_frame = inverse(place @ from_vector(values[PLACE]))
         optics = self.optics(values, distance_m)
         seen: FloatArray = project(optics[None], camera_from_frame[None], points_m)[0]
         return seen
 
     def steps(self) -> FloatArray:
-        """(14,) steps for numeric derivatives."""
+        """(P,) steps for numeric derivatives."""
         sigma = np.sqrt(np.diag(self.covariance))
         return np.where(sigma > 0, 0.1 * sigma, 1e-7)
 
@@ -122,6 +128,7 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
     place_name = next((n for n in _PLACES if getattr(calibration, n) is not None), "")
     place: TransformSource | None = getattr(calibration, place_name) if place_name else None
     covariance, correlated = _covariance(solution, law, place, place_name)
+    held = len(FITTED_DISTORTION)
     return Side(
         label=label,
         recording=calibration.recording,
@@ -132,7 +139,7 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
         values=_values(solution, law),
         covariance=covariance,
         correlated=correlated,
-        more_distortion=dict(zip(DISTORTION[2:], solution.distortion[2:], strict=True)),
+        more_distortion=dict(zip(DISTORTION[held:], solution.distortion[held:], strict=True)),
         place_name=place_name,
         place=None if place is None else place.matrix,
         has_corner=law is not None and zones is not None and zones.method == "change_point",
@@ -145,8 +152,9 @@ def _values(solution: SolutionSource, law: LawSource | None) -> FloatArray:
         (alpha, bend), told = law.values(), solution.alpha_px
         named = {_ALIASES.get(n): p.value for n, p in law.parameters.items()}
         beta = named.get("beta", alpha * solution.beta_px / told)
-    optics = [solution.u0_px, solution.v0_px, solution.skew_px, solution.k1, solution.k2]
-    return np.array([alpha, beta, bend, *optics, *np.zeros(6)])
+    optics = [solution.u0_px, solution.v0_px, solution.skew_px]
+    fitted = solution.distortion[: len(FITTED_DISTORTION)]
+    return np.array([alpha, beta, bend, *optics, *fitted, *np.zeros(6)])
 
 
 def _covariance(
@@ -155,7 +163,7 @@ def _covariance(
     place: TransformSource | None,
     place_name: str,
 ) -> tuple[FloatArray, bool]:
-    """(14, 14), and whether it is more than a diagonal."""
+    """(P, P), and whether it is more than a diagonal."""
     found = np.zeros((len(NAMES), len(NAMES)))
     if solution.covariance is not None:
         names = [_name(n, place_name) for n in solution.covariance.names]
@@ -167,7 +175,7 @@ def _covariance(
     if law is not None:
         sigma |= {_name(n, place_name): p.sigma for n, p in law.parameters.items()}
     if place is not None:
-        sigma |= dict(zip(NAMES[8:], (*place.sigma_p_m, *place.sigma_r_rad), strict=True))
+        sigma |= dict(zip(NAMES[PLACE], (*place.sigma_p_m, *place.sigma_r_rad), strict=True))
     known = np.array([sigma.get(name, 0.0) for name in NAMES])
     return np.diag(known**2), False
 

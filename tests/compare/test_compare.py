@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -17,7 +18,9 @@ from calib.calibration.mapping import as_mapping
 from calib.chain.rigid import from_vector
 from cell.cli.app import app
 from cell.compare import Side, compare, side_of
+from cell.compare.field import differences, field_of
 from cell.compare.page import render
+from cell.compare.side import NAMES, PLACE
 from cell.compare.sources import source_of
 from cell.errors import InputError
 from cell.export import CalibrationSource
@@ -69,7 +72,7 @@ def test_a_fixed_camera_is_compared_in_the_robot_s_base() -> None:
     found = compare(*(_calibrated(seed, mount="eye_to_hand") for seed in (1, 2)))
     assert found.a.place_name == "base_from_camera"
     assert found.a.correlated
-    assert (np.diag(found.a.covariance)[8:] > 0).all()
+    assert (np.diag(found.a.covariance)[PLACE] > 0).all()
     assert found.mounted is not None
     assert found.mounted.beyond_chance is False
 
@@ -131,6 +134,45 @@ def test_without_any_uncertainty_it_does_not_judge() -> None:
     assert found.camera.beyond_chance is None
     assert found.camera.rows[0].p_value is None
     assert found.camera.rows[0].rms_px > 0.1
+
+
+MORE = {"p1": 0.0011, "p2": -0.0007, "k3": -0.02}
+
+
+def test_every_distortion_coefficient_has_its_part_in_the_difference() -> None:
+    plain, more = _side(STILL), _side(with_joint(STILL, **MORE))
+    centre_px = np.array([2052.3, 1548.5])
+    camera = np.array([[4755.8123, 0.0, 2052.3], [0.0, 4789.1456, 1548.5], [0.0, 0.0, 1.0]])
+    field = field_of(plain, more)
+    ahead = (np.eye(4), np.eye(4))
+    found = differences(plain, more, field, (plain.values, more.values), ahead)[0]
+    seen, _ = cv2.projectPoints(
+        field.points_m[0],
+        np.zeros(3),
+        np.zeros(3),
+        camera,
+        np.array([-0.11, 0.057, *MORE.values()]),
+    )
+    assert np.abs(found - (seen[:, 0] - field.pixels)).max() < 1e-6
+    assert np.abs(found).max() > 1.0
+    back = field_of(more, plain)
+    again = more.pixels(more.values, back.points_m[0], float(back.distances_m[0]), np.eye(4))
+    assert np.abs(again - back.pixels).max() < 1e-6
+    assert np.linalg.norm(back.pixels - centre_px, axis=1).max() > 2000.0
+
+
+def test_what_chance_does_to_decentering_and_k3_counts() -> None:
+    names = ("alpha_px", "beta_px", "u0_px", "v0_px", "k1", "k2", *MORE)
+    sigma = np.array([0.5, 0.5, 1.0, 1.0, 1e-3, 1e-2, 3e-5, 3e-5, 5e-3])
+    covariance = {"names": names, "matrix": np.diag(sigma**2).tolist()}
+    content = with_joint(STILL, **MORE, covariance=covariance)
+    side = _side(content)
+    freed = [NAMES.index(name) for name in MORE]
+    assert np.sqrt(np.diag(side.covariance)[freed]) == pytest.approx(sigma[-3:])
+    held = {"names": names[:6], "matrix": np.diag(sigma[:6] ** 2).tolist()}
+    without = _side(with_joint(STILL, **MORE, covariance=held))
+    row, less = (compare(s, s).camera.rows[0] for s in (side, without))
+    assert row.by_chance_px > 1.01 * less.by_chance_px
 
 
 def test_a_law_of_the_scale_factors_is_compared_as_exported() -> None:

@@ -38,6 +38,27 @@ def test_a_lens_that_stands_still_needs_no_distance(tool: str, tmp_path: Path) -
     assert 4755.8123 in map(float, numbers)
 
 
+@pytest.mark.parametrize("tool", FORMATS)
+def test_decentering_and_k3_of_a_joint_fit_are_written_or_refused(
+    tool: str, tmp_path: Path
+) -> None:
+    decentred = {"p1": 0.0011231, "p2": -0.0007232}
+    written = _export(tmp_path, with_joint(STILL, **decentred), tool)
+    assert all(f"{value:.16e}"[:9] in _scientific(written) for value in decentred.values())
+    content = with_joint(STILL, **decentred, k3=-0.0204233)
+    if tool == "kalibr":
+        with pytest.raises(InputError, match="coefficient k3"):
+            _export(tmp_path, content, tool)
+        return
+    assert f"{-0.0204233:.16e}"[:9] in _scientific(_export(tmp_path, content, tool))
+
+
+def _scientific(text: str) -> str:
+    """Every number of a text in one notation."""
+    numbers = re.findall(r"-?\d+\.\d*(?:e[-+]?\d+)?", text)
+    return " ".join(f"{float(number):.16e}" for number in numbers)
+
+
 @pytest.mark.parametrize("tool", [t for t in FORMATS if t != "json"])
 def test_a_focal_length_that_moves_is_refused_with_the_distances_to_choose(
     tool: str, tmp_path: Path

@@ -10,6 +10,7 @@ from cell.report.data import ReportData
 from cell.report.numbers import UNKNOWN, number, plus_minus, solution_name, symbol
 
 _PARAMETERS = ("alpha_px", "beta_px", "u0_px", "v0_px", "skew_px", "k1", "k2")
+_WHERE_FREED = ("p1", "p2", "k3")
 
 
 def tables(data: ReportData) -> str:
@@ -63,9 +64,13 @@ def _parameters(solutions: Mapping[str, Mapping[str, Any]]) -> str:
     head = ("parameter", *(solution_name(name) for name in solutions))
     rows = [
         (_head(p), *(_value(s, p) for s in solutions.values()))
-        for p in _PARAMETERS
+        for p in (*_PARAMETERS, *_freed(solutions))
     ]  # fmt: skip
     return html.table(head, rows, "Camera parameters (compare Table 2 of the paper)")
+
+
+def _freed(solutions: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    return [name for name in _WHERE_FREED if any(s.get(name) for s in solutions.values())]
 
 
 def _head(parameter: str) -> str:
@@ -73,5 +78,7 @@ def _head(parameter: str) -> str:
 
 
 def _value(solution: Mapping[str, Any], parameter: str) -> str:
+    if parameter in _WHERE_FREED and not solution.get(parameter):
+        return "held at 0"
     sigma = (solution.get("sigma") or {}).get(parameter)
     return plus_minus(solution.get(parameter), sigma)
