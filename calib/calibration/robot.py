@@ -13,6 +13,7 @@ import numpy as np
 
 from calib.calibration.joint_lens import with_deserved_terms
 from calib.calibration.result import VALUES, RobotReference
+from calib.calibration.vindication import vindicated
 from calib.chain.effects import make_effect
 from calib.chain.model import CellModel, walk
 from calib.chain.optics import COLUMN
@@ -82,17 +83,22 @@ def fit_robot(
     hand = hand_eye_of(views, used, camera_from_board)
     taken = hand.used
     corners = np.where(weight[..., None] > 0, views.corners_px, np.nan)
-    chosen = replace(views, corners_px=corners).take(taken)
-    outliers = tuple(int(f) for f in views.frame[used & views.has_pose & ~taken])
+    counted = replace(views, corners_px=corners)
+    chosen = counted.take(taken)
+    outliers = _left_out(views, used, taken)
     noise = Noise(sigma_px, max(hand.rms_m / 3, 1e-6), max(hand.rms_rad / 3, 1e-6))
     plain = CellModel(_without_skew(optics), hand.flange_from_mounted, hand.base_from_fixed)
     try:
         law, joint, gain = _best_lens(plain, chosen, noise)
-        joint = with_deserved_terms(joint, chosen)
+        back = vindicated(joint.model, counted, taken, used & views.has_pose & ~taken)
+        if back.any():
+            joint = _fit(joint.model, counted.take(taken | back), joint.noise)
+        joint = with_deserved_terms(joint, counted.take(taken | back))
     except np.linalg.LinAlgError:
         return RobotFit(_from_hand_eye(hand, sigma_px, outliers), None, taken)
     if not _plausible(joint, plain):
         return RobotFit(_from_hand_eye(hand, sigma_px, outliers), None, taken)
+    taken = taken | back
     places = [[u.name for u in joint.unknowns].index(name) for name in _POSE]
     reference = RobotReference(
         mount=views.mount,
@@ -104,10 +110,14 @@ def fit_robot(
         corner_sigma_px=joint.noise.corner_px,
         law=law,
         gain_aic=gain,
-        outliers=outliers,
+        outliers=_left_out(views, used, taken),
         source="joint",
     )
     return RobotFit(reference, joint, taken)
+
+
+def _left_out(views: Views, used: BoolArray, taken: BoolArray) -> tuple[int, ...]:
+    return tuple(int(f) for f in views.frame[used & views.has_pose & ~taken])
 
 
 def hand_eye_of(views: Views, used: BoolArray, camera_from_board: FloatArray) -> HandEye:
