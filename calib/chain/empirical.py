@@ -211,6 +211,20 @@ class Curve:
             return wave(value, self.period)
         return basis(self.covariate, value, self.low, self.high)
 
+    def carried(self, walk: Walk) -> FloatArray:
+        """(N, B) of the functions that carry the curve in a cell.
+
+        A joint between the first and the last has a constant of its own that neither mount nor
+        board absorbs: a curve that only starts at some angle has one, too.
+        """
+        functions = self.functions(walk)
+        if self.site.name not in _OWN_CONSTANT:
+            return functions
+        return np.concatenate([functions, np.ones((len(functions), 1))], axis=1)
+
+
+_OWN_CONSTANT = ("joint_2", "joint_3", "joint_4", "joint_5")
+
 
 def empirical(curve: Curve, functions: int) -> Effect:
     """An effect by which the site follows the covariate along that many functions."""
@@ -221,7 +235,7 @@ def empirical(curve: Curve, functions: int) -> Effect:
         coefficients = values[:amount_count]
         if not coefficients.any():
             return
-        amounts = curve.functions(walk) @ coefficients.reshape(functions, len(site.components))
+        amounts = curve.carried(walk) @ coefficients.reshape(functions, len(site.components))
         site.shift(amounts, walk)
 
     return Effect(
@@ -276,7 +290,7 @@ def span(values: FloatArray) -> tuple[float, float]:
 
 def present_curve(curve: Curve, walk: Walk) -> Present:
     """The curve as an effect with all amounts zero, sized for this walk."""
-    effect = empirical(curve, curve.functions(walk).shape[1])
+    effect = empirical(curve, curve.carried(walk).shape[1])
     return Present(effect, effect.values({}))
 
 

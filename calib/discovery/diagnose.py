@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from calib.chain.effect import Present
 from calib.chain.effects import catalogue
-from calib.chain.model import kinematics_of
+from calib.chain.model import kinematics_of, walk
 from calib.discovery.ambiguity import ambiguities
 from calib.discovery.bookkeeping.branches import choose_branches, with_branches
 from calib.discovery.bookkeeping.slip import Slip
@@ -26,8 +26,10 @@ from calib.discovery.diagnosis import (
 )
 from calib.discovery.leftover import Leftover, look_for_leftover
 from calib.discovery.locate import Cell, locate
+from calib.discovery.pictures import fit_blur, told_of
 from calib.discovery.prove import held_out, prediction_rms_px, prove
 from calib.discovery.search import Search
+from calib.discovery.split import split_misfit
 from calib.discovery.start import Fitter, fit_start
 from calib.solver.joint import JointFit
 from calib.solver.noise import Noise, profile
@@ -104,6 +106,7 @@ def _told(books: Books, held: BoolArray, before: JointFit, leftover: Leftover) -
     everything = Fitter(books.views, books.has_robot)
     twin = everything.settled(_restarted(after, len(books.views), held))
     plain = everything.fit(before.model, before.noise)
+    judge = _judge(plain.noise, twin.noise)
     fits = _Fits(before, after, twin, plain)
     held_views = books.views.take(held)
     proof = prove(before, after, held_views)
@@ -114,13 +117,14 @@ def _told(books: Books, held: BoolArray, before: JointFit, leftover: Leftover) -
         ambiguous_with=ambiguities(search),
         unexplained=_unexplained(leftover),
         mismatch=_mismatches(fits, everything),
+        split=(split_misfit(plain, judge), split_misfit(twin, judge)),
         proof=proof,
         plain=plain,
         twin=twin,
         views=books.views,
         log=books.log,
         rejected=books.rejected,
-        said=(*books.said, *_unseen(books.views)),
+        said=(*books.said, *_pictures(twin, books.views), *_unseen(books.views)),
     )
 
 
@@ -238,6 +242,11 @@ def _excess(fit: JointFit) -> float:
     """Squared misfit, in units of the noise, above what noise alone makes."""
     square = profile(fit.equations, fit.noise).square_sum
     return max(square - (fit.equations.observations - fit.parameters), 1.0)
+
+
+def _pictures(twin: JointFit, views: Views) -> tuple[str, ...]:
+    state = walk(twin.model, views, flange_error=twin.flange_error)
+    return told_of(fit_blur(views.blur_px, state.distance_m))
 
 
 def _unseen(views: Views) -> tuple[str, ...]:

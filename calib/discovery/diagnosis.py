@@ -7,6 +7,7 @@ from typing import Literal
 
 from calib.calibration.result import Rejection
 from calib.discovery.prove import Proof
+from calib.discovery.split import Split
 from calib.solver.joint import JointFit
 from calib.views import Views
 
@@ -76,6 +77,8 @@ class Diagnosis:
     ----------
     verdict, effects, ambiguous_with, unexplained, mismatch, proof:
         As in the contract's diagnosis.json.
+    split:
+        The misfit of the plain cell and of the twin, judged by the twin's noise.
     plain, twin:
         The plain cell and the cell with all that was found, each fitted to every usable frame.
     views, log:
@@ -89,6 +92,7 @@ class Diagnosis:
     ambiguous_with: tuple[Ambiguity, ...]
     unexplained: Unexplained | None
     mismatch: tuple[Mismatch, ...]
+    split: tuple[Split, Split]
     proof: Proof | None
     plain: JointFit
     twin: JointFit

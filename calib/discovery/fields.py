@@ -11,14 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from calib.chain.effect import Link
+from calib.chain.effect import Link, Present
 from calib.chain.projection import project_with_jacobians
-from calib.discovery.score import Score
+from calib.discovery.score import Score, extended
 from calib.solver.joint import JointFit
 from calib.solver.unknowns import Dependence
 from calib.views import FloatArray, Views
 
 _ORDER = 6
+IMAGE_FIELD = "image_field"
+BOARD_HEIGHT = "board_height"
 
 
 @dataclass(frozen=True)
@@ -43,31 +45,71 @@ def cosine_modes(x: FloatArray, y: FloatArray, order: int = _ORDER) -> FloatArra
     return np.stack(waves, axis=-1)
 
 
-def field_scores(fit: JointFit, views: Views) -> list[FieldScore]:
-    """Test a field of pixel shifts over the image, and of heights and shifts over the board."""
-    found = fit.dependence
+@dataclass(frozen=True)
+class _Fields:
+    """(N, M, 2, F) columns of both fields, the board's modes, and predicted pixels."""
+
+    image: FloatArray
+    height: FloatArray
+    board_modes: FloatArray
+    pixels: FloatArray
+    base: FloatArray
+
+
+def _fields(found: Dependence, views: Views) -> _Fields:
     state = found.state
     pixels, j_pose, j_optics = project_with_jacobians(
         state.optics, state.camera_from_board, state.points_m
     )
     base = _base_columns(found, j_pose, j_optics, state.camera_from_board)
-    weight = np.sqrt(fit.weight) / fit.noise.corner_px
     u, v = pixels[..., 0] / views.width_px, pixels[..., 1] / views.height_px
-    image = cosine_modes(np.clip(u, 0, 1), np.clip(v, 0, 1))
+    modes = cosine_modes(np.clip(u, 0, 1), np.clip(v, 0, 1))
     corners = views.board.corners_m
     extent = np.maximum(corners.max(axis=0), 1e-9)
     board = cosine_modes(corners[:, 0] / extent[0], corners[:, 1] / extent[1])
     j_point = np.einsum("nmck,nkl->nmcl", j_pose[..., :3], state.camera_from_board[:, :3, :3])
-    zero = np.zeros_like(image)
+    zero = np.zeros_like(modes)
     shifts = np.concatenate(
-        [np.stack([image, zero], axis=2), np.stack([zero, image], axis=2)], axis=3
+        [np.stack([modes, zero], axis=2), np.stack([zero, modes], axis=2)], axis=3
     )
     heights = j_point[..., 2:3] * board[None, :, None, :]
-    test = _Test(fit, base, weight)
+    return _Fields(shifts, heights, board, pixels, base)
+
+
+def field_scores(fit: JointFit, views: Views) -> list[FieldScore]:
+    """Test a field of pixel shifts over the image, and of heights over the board."""
+    fields = _fields(fit.dependence, views)
+    test = _Test(fit, fields.base)
+    image = test.of(fields.image, fields.pixels)
+    height = test.of_board(fields.height, fields.board_modes, views)
     return [
-        FieldScore("image_field", "lens", "image place", *test.of(shifts, pixels, views)),
-        FieldScore("board_height", "board", "board place", *test.of_board(heights, board, views)),
+        FieldScore(IMAGE_FIELD, "lens", "image place", *image),
+        FieldScore(BOARD_HEIGHT, "board", "board place", *height),
     ]
+
+
+def picture_scores(fit: JointFit, views: Views, present: Present, site: str) -> tuple[Score, Score]:
+    """What an effect would gain in the pictures alone, by itself and beside a field.
+
+    Parameters
+    ----------
+    fit:
+        A fit without the effect.
+    present:
+        The effect; its shapes and settings are taken, its amounts are not.
+    site:
+        `IMAGE_FIELD` or `BOARD_HEIGHT`.
+    """
+    blank = np.where([p.role == "amount" for p in present.effect.parameters], 0.0, present.values)
+    _, found, unknowns, first = extended(fit, views, (Present(present.effect, blank),))
+    fields = _fields(found, views)
+    columns = fields.base[..., 6 + first :]
+    base = fields.base[..., : 6 + first]
+    assert columns.shape[3] == len(unknowns) - first
+    field = fields.image if site == IMAGE_FIELD else fields.height
+    alone = _Test(fit, base).score(columns)
+    beside = _Test(fit, np.concatenate([base, field], axis=3)).score(columns)
+    return alone, beside
 
 
 def _base_columns(
@@ -84,18 +126,27 @@ def _base_columns(
     return np.concatenate([j_pose, shared], axis=3)
 
 
+def _orthonormal(columns: FloatArray) -> FloatArray:
+    """Basis of what the columns span, nearly dependent ones left out."""
+    if columns.shape[1] == 0:
+        return columns
+    u, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(u[:, size > 1e-7 * size[0]])
+
+
 class _Test:
     """Projection onto what a free pose for each frame and the fitted numbers cannot absorb."""
 
-    def __init__(self, fit: JointFit, base: FloatArray, weight: FloatArray) -> None:
-        self.fit, self.weight = fit, weight
-        n, m = weight.shape
-        scale = np.repeat(weight[:, :, None], 2, axis=2).reshape(n, 2 * m)
+    def __init__(self, fit: JointFit, base: FloatArray) -> None:
+        self.weight = np.sqrt(fit.weight) / fit.noise.corner_px
+        n, m = self.weight.shape
+        scale = np.repeat(self.weight[:, :, None], 2, axis=2).reshape(n, 2 * m)
         rows = base.reshape(n, 2 * m, -1) * scale[:, :, None]
         self.scale = scale
         self.q, _ = np.linalg.qr(rows[:, :, :6])
-        shared = self._without_pose(rows[:, :, 6:])
-        self.shared_q, _ = np.linalg.qr(shared.reshape(n * 2 * m, -1))
+        shared = self._without_pose(rows[:, :, 6:]).reshape(n * 2 * m, -1)
+        size = np.linalg.norm(shared, axis=0)
+        self.shared_q = _orthonormal(shared[:, size > 0.0] / size[size > 0.0])
         residual = np.nan_to_num(fit.residual_px).reshape(n, 2 * m) * scale
         self.residual = self._clean(residual[:, :, None])[:, 0]
 
@@ -106,7 +157,8 @@ class _Test:
         flat = self._without_pose(columns).reshape(-1, columns.shape[2])
         return np.asarray(flat - self.shared_q @ (self.shared_q.T @ flat))
 
-    def _score(self, columns: FloatArray) -> Score:
+    def score(self, columns: FloatArray) -> Score:
+        """Test a group of (N, M, 2, F) columns."""
         n, m = self.weight.shape
         rows = columns.reshape(n, 2 * m, -1) * self.scale[:, :, None]
         flat = self._clean(rows)
@@ -120,9 +172,9 @@ class _Test:
         step = vt[kept].T @ (along / s[kept])
         return Score(gain / noise, rank, p, step)
 
-    def of(self, columns: FloatArray, pixels: FloatArray, views: Views) -> tuple[Score, str]:
+    def of(self, columns: FloatArray, pixels: FloatArray) -> tuple[Score, str]:
         """Score a field over the image; where it is largest."""
-        score = self._score(columns)
+        score = self.score(columns)
         size = np.linalg.norm(columns @ score.step, axis=2)
         at = np.unravel_index(int(np.argmax(size * (self.weight > 0))), size.shape)
         u, v = pixels[at]
@@ -130,7 +182,7 @@ class _Test:
 
     def of_board(self, columns: FloatArray, modes: FloatArray, views: Views) -> tuple[Score, str]:
         """Score a height field over the board, print noise allowed for; where it is largest."""
-        score = self._score(columns)
+        score = self.score(columns)
         height = modes @ score.step
         row, col = divmod(int(np.argmax(np.abs(height - np.median(height)))), views.board.cols)
         return score, f"around row {row}, column {col}"

@@ -27,11 +27,9 @@ class Leftover:
     cells: tuple[Cell, ...]
 
 
-def alarm(cells: list[Cell]) -> Cell | None:
-    """The most significant cell, if it is more than chance among all those tested."""
-    if not cells:
-        return None
-    return cells[0] if cells[0].p_value * len(cells) < ALARM else None
+def alarms(cells: list[Cell]) -> list[Cell]:
+    """The cells that are more than chance among all those tested, the most significant first."""
+    return [cell for cell in cells if cell.p_value * len(cells) < ALARM]
 
 
 def is_shape_of_law(cell: Cell, search: Search) -> bool:
@@ -45,12 +43,15 @@ def look_for_leftover(search: Search) -> Leftover:
     found: list[Cell] = []
     views = search.views
     for _ in range(_MOST_CURVES):
-        fit = search.best.fit
-        cell = alarm(locate(fit, views))
-        if cell is None or is_shape_of_law(cell, search):
+        told = alarms(locate(search.best.fit, views))
+        cell = next((c for c in told if not is_shape_of_law(c, search)), None)
+        if cell is None:
             break
         found.append(cell)
-        if cell.curve is None or not _carry(search, cell, views):
+        if cell.curve is None:
+            search.drop_beside_field(cell.site)
+            break
+        if not _carry(search, cell, views):
             break
     return Leftover(search, tuple(found))
 

@@ -23,6 +23,7 @@ def as_mapping(
         "recording": recording,
         "verdict": found.verdict,
         "holdout": None if found.proof is None else vars(found.proof),
+        "misfit": {"before": vars(found.split[0]), "after": vars(found.split[1])},
         "mismatch": [vars(m) for m in found.mismatch],
         "effects": [_effect(e) for e in found.effects],
         "ambiguous_with": [

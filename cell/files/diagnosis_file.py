@@ -47,6 +47,22 @@ class HoldoutPart(_Part):
     """Negative log likelihood per frame."""
 
 
+class SplitPart(_Part):
+    """Squared misfit in units of the noise, per degree of freedom: one where only noise is left."""
+
+    pose: NotNegative
+    """Of what a free camera pose could absorb: where focus and every fault of the arm hide."""
+    picture: NotNegative
+    """Of what it could not: seen in the pictures alone."""
+
+
+class MisfitPart(_Part):
+    """The misfit of the plain model and of the final one, judged by the final noise."""
+
+    before: SplitPart
+    after: SplitPart
+
+
 class MismatchPart(_Part):
     """Where the misfit of the plain model lives."""
 
@@ -111,6 +127,7 @@ class DiagnosisFile(_Part):
     recording: str
     verdict: Literal["consistent", "explained", "unexplained"]
     holdout: HoldoutPart | None
+    misfit: MisfitPart
     mismatch: list[MismatchPart]
     effects: list[EffectPart]
     ambiguous_with: list[AmbiguityPart]

@@ -193,6 +193,10 @@ def diagnosis(**changes: Any) -> dict[str, Any]:
         "verdict": "explained",
         "holdout": {"frames": [3, 9, 15], "rms_px_before": 4.21, "rms_px_after": 0.118,
                     "noise_px": 0.104, "nll_before": 310.0, "nll_after": -42.0},
+        "misfit": {
+            "before": {"pose": 410.0, "picture": 1.02},
+            "after": {"pose": 1.04, "picture": 1.0},
+        },
         "mismatch": [
             _mismatch("lens", "focal length", "distance", "0.25 to 0.45 m", 0.71, 1e-40),
             _mismatch("arm", "flange", "joint_3", "above 70°", 0.24, 3e-9),
