@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
+import calib
 from cell.doctor.finding import Finding
 from cell.files.camera_file import GigeCamera
 from cell.files.cell_file import CellFile
@@ -35,7 +38,26 @@ def installed(cell: CellFile | None) -> list[Finding]:
     """Packages and limits; those that only other cells need are told and do not block."""
     python = Finding("Python", True, platform.python_version())
     needed = [_package(name, "pip install calibration-cell") for name in _ALWAYS]
-    return [python, *needed, *_drivers(cell), *_gige(cell)]
+    return [python, *needed, _compiled(), *_drivers(cell), *_gige(cell)]
+
+
+def _compiled() -> Finding:
+    """Where numba keeps compiled code, in the order in which numba looks for a place."""
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    places = [Path(given)] if given else [Path(calib.__file__).parent, Path.home() / ".cache"]
+    place = next((place for place in places if _writable(place)), None)
+    return Finding(
+        "numba cache",
+        place is not None,
+        f"{' and '.join(map(str, places))} cannot be written" if place is None else str(place),
+        "export NUMBA_CACHE_DIR=/path/you/may/write; without it nothing that is compiled can start",
+    )
+
+
+def _writable(place: Path) -> bool:
+    """Whether a folder can be written, or made."""
+    there = next(folder for folder in (place, *place.parents) if folder.exists())
+    return there.is_dir() and os.access(there, os.W_OK)
 
 
 def _package(name: str, mend: str, *, needed: bool = True) -> Finding:

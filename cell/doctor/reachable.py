@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import socket
-import struct
+import time
 from pathlib import Path
 
+from cell.doctor.abb import abb
 from cell.doctor.finding import Finding
+from cell.doctor.gige import gige
+from cell.doctor.ports import host_port, port
+from cell.doctor.universal_robot import universal_robot
 from cell.files.camera_file import GenicamCamera, GigeCamera, RobotiqCamera
 from cell.files.cell_file import AbbRobot, CellFile, UniversalRobot
-from drivers.aravis_network import GVCP_PORT, packet_bytes_for
-from drivers.errors import DeviceUnreachable
+from drivers.errors import DeviceError
 
-_TIMEOUT_S = 2.0
-_JUMBO_BYTES = 8000
-_UR_PORTS = {29999: "dashboard", 30003: "script", 30004: "RTDE"}
-_CHECK_LINE = "check power, cable, address and firewall"
+_SETTINGS_S = 3.0
 
 
 def reachable(cell: CellFile) -> list[Finding]:
@@ -26,55 +25,30 @@ def reachable(cell: CellFile) -> list[Finding]:
 def _robot(cell: CellFile) -> list[Finding]:
     robot = cell.robot
     if isinstance(robot, UniversalRobot):
-        ports = [_port(f"UR {name}", robot.address, port) for port, name in _UR_PORTS.items()]
-        return ports + (_ur_state(robot.address) if ports[0].ready else [])
+        return [*universal_robot(robot), _payload(cell)]
     if isinstance(robot, AbbRobot):
-        host, port = _host_port(robot.address, 80)
-        return [_port("ABB Robot Web Services", host, port)]
+        return [*abb(robot), _payload(cell)]
     return [Finding("arm", True, f"simulated {robot.model}")]
 
 
-def _ur_state(address: str) -> list[Finding]:
-    from drivers.ur.dashboard import Dashboard
-
-    dashboard = Dashboard(address)
-    try:
-        remote = dashboard.ask("is in remote control")
-        safety = dashboard.ask("safetystatus")
-        mode = dashboard.ask("robotmode")
-    except DeviceUnreachable as silent:
-        return [Finding("UR dashboard", False, str(silent), _CHECK_LINE)]
-    finally:
-        dashboard.close()
-    return [
-        Finding(
-            "UR remote control",
-            "false" not in remote.lower(),
-            remote,
-            "switch the pendant from Local to Remote",
-        ),
-        Finding(
-            "UR safety",
-            "NORMAL" in safety or "REDUCED" in safety,
-            safety,
-            "look why it stopped, then release it at the pendant",
-        ),
-        Finding(
-            "UR mode",
-            "RUNNING" in mode,
-            mode,
-            "power on and release the brakes at the pendant",
-        ),
-    ]
+def _payload(cell: CellFile) -> Finding:
+    given = cell.robot.payload_kg
+    return Finding(
+        "payload",
+        given > 0,
+        f"{given:g} kg in the cell file",
+        "weigh camera and bracket, write robot.payload_kg, and set the same at the pendant: an arm"
+        " that does not know its load sags and trips",
+        needed=False,
+    )
 
 
 def _camera(cell: CellFile) -> list[Finding]:
     camera = cell.camera
     if isinstance(camera, GigeCamera):
-        return [_gige(camera.address), _packets(camera.address)]
+        return gige(camera)
     if isinstance(camera, RobotiqCamera):
-        host, port = _host_port(camera.address, 4242)
-        return [_port("Robotiq camera server", host, port)]
+        return _robotiq(camera)
     if isinstance(camera, GenicamCamera):
         there = Path(camera.producer).is_file()
         found = str(camera.producer) if there else f"{camera.producer} is not there"
@@ -83,44 +57,27 @@ def _camera(cell: CellFile) -> list[Finding]:
     return [Finding("camera", True, f"simulated {camera.width} x {camera.height}")]
 
 
-def _gige(address: str) -> Finding:
-    """Ask one address for its discovery record (GigE Vision GVCP, command 0x0002)."""
-    name = f"GigE camera {address}"
-    ask = struct.pack(">BBHHH", 0x42, 0x01, 0x0002, 0, 1)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        link.settimeout(_TIMEOUT_S)
-        try:
-            link.sendto(ask, (address, GVCP_PORT))
-            reply = link.recv(1024)
-        except OSError as silent:
-            return Finding(name, False, f"does not answer ({silent})", _CHECK_LINE)
-    vendor, model = (_text(reply[8 + at : 8 + at + 32]) for at in (72, 104))
-    return Finding(name, True, f"{vendor} {model}".strip() or "answers")
+def _robotiq(camera: RobotiqCamera) -> list[Finding]:
+    from drivers.robotiq_http import PORT, RobotiqHttp
 
-
-def _packets(address: str) -> Finding:
+    host, number = host_port(camera.address, PORT)
+    server = port("Robotiq camera server", host, number)
+    if not server.ready:
+        return [server]
+    http = RobotiqHttp(host, number)
     try:
-        size = packet_bytes_for(address)
-    except OSError as fault:
-        return Finding("packet size", False, str(fault), _CHECK_LINE)
-    mend = "set the MTU of that network card (and of switches between) to 9000"
-    ready = size >= _JUMBO_BYTES
-    return Finding("packet size", ready, f"{size} bytes", mend, needed=False)
-
-
-def _port(name: str, host: str, port: int) -> Finding:
-    name = f"{name} {host}:{port}"
-    try:
-        with socket.create_connection((host, port), _TIMEOUT_S):
-            return Finding(name, True, "answers")
-    except OSError as silent:
-        return Finding(name, False, f"does not answer ({silent})", _CHECK_LINE)
-
-
-def _host_port(address: str, port: int) -> tuple[str, int]:
-    host, _, given = address.partition(":")
-    return host, int(given) if given.isdecimal() else port
-
-
-def _text(raw: bytes) -> str:
-    return raw.split(b"\0")[0].decode("latin-1")
+        settings = http.settings(time.monotonic() + _SETTINGS_S)
+    except DeviceError as silent:
+        return [server, Finding("Robotiq settings", False, str(silent), "start the URCap again")]
+    finally:
+        http.close()
+    return [
+        server,
+        Finding(
+            "Robotiq settings",
+            settings is not None,
+            "none in this firmware" if settings is None else "exposure, gain and focus",
+            "update the URCap: without them the focus cannot be locked and moves by itself",
+            needed=False,
+        ),
+    ]

@@ -1,22 +1,29 @@
 from __future__ import annotations
 
-import contextlib
-import socket
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from calib.chain.kinematics import arm as kinematics_of
 from cell.doctor import examine
 from cell.doctor.finding import Finding
 from cell.factory import arm_of, camera_of
 from cell.files.cell_file import CellFile, read_cell
+from drivers import aravis_network
 from drivers.abb import ABBArm
 from drivers.aravis import AravisCamera
 from drivers.genicam_settings import FeatureNames
 from drivers.robotiq import RobotiqCamera
 from drivers.ur import URArm
+from sim.arm import SimArm
+from sim.clock import WallClock
+from sim.peers.abb import ABBController
+from sim.peers.callable_camera import CallableCamera
+from sim.peers.gige import GigEPeer
+from sim.peers.robotiq import RobotiqPeer
+from sim.peers.ur import URController
 from tests.cell.plans import CELL
 
 SIM_ROBOT, SIM_CAMERA = "{driver: sim, model: ur5e}", "{driver: sim, model: bench-camera"
@@ -49,36 +56,29 @@ def test_a_silent_robot_is_in_the_way(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def local_mode_robot() -> Iterator[str]:
-    """A dashboard server of a robot in local mode."""
-    address = "127.0.0.78"
-    replies = {
-        "is in remote control": "false",
-        "safetystatus": "Safetystatus: NORMAL",
-        "robotmode": "Robotmode: RUNNING",
-    }
-
-    def serve(listener: socket.socket) -> None:
-        while True:
-            try:
-                link, _ = listener.accept()
-            except OSError:
-                return
-            with contextlib.suppress(OSError), link, link.makefile("rw") as lines:
-                lines.write("Connected: Universal Robots Dashboard Server\n")
-                lines.flush()
-                for line in lines:
-                    lines.write(replies[line.strip()] + "\n")
-                    lines.flush()
-
-    with socket.create_server((address, 29999)) as listener:
-        threading.Thread(target=serve, args=(listener,), daemon=True).start()
-        yield address
+def ur() -> Iterator[URController]:
+    arm = SimArm(kinematics_of("ur5e"), WallClock(), np.zeros(6))
+    with URController(arm, "127.0.0.78") as controller:
+        yield controller
 
 
-def test_a_robot_in_local_mode_is_named(tmp_path: Path, local_mode_robot: str) -> None:
-    robot = f"{{driver: ur, model: ur5e, address: {local_mode_robot}}}"
-    findings = examine(cell_with(tmp_path, robot))
+def ur_cell(folder: Path, controller: URController) -> CellFile:
+    return cell_with(folder, f"{{driver: ur, model: ur5e, address: {controller.address}}}")
+
+
+def test_a_ready_robot_is_told_as_ready(tmp_path: Path, ur: URController) -> None:
+    ur.tcp_offset = (0.0, 0.0, 0.15, 0.0, 0.0, 0.0)
+    findings = examine(ur_cell(tmp_path, ur))
+    assert not [finding.line() for finding in findings if finding.blocks]
+    assert "0.0 0.0 150.0 mm from the flange" in by_name(findings, "UR tool").found
+    assert "taken out of every pose" in by_name(findings, "UR tool").found
+    assert "s from this computer's" in by_name(findings, "UR clock").found
+    assert "weigh camera and bracket" in by_name(findings, "payload").line()
+
+
+def test_a_robot_in_local_mode_is_named(tmp_path: Path, ur: URController) -> None:
+    ur.remote_control = False
+    findings = examine(ur_cell(tmp_path, ur))
     remote = by_name(findings, "UR remote control")
     assert remote.blocks
     assert "switch the pendant from Local to Remote" in remote.line()
@@ -86,29 +86,110 @@ def test_a_robot_in_local_mode_is_named(tmp_path: Path, local_mode_robot: str) -
     assert by_name(findings, "UR mode").ready
 
 
+def test_a_protective_stop_and_a_tool_in_millimetres_are_named(
+    tmp_path: Path, ur: URController
+) -> None:
+    ur.protective_stop()
+    ur.tcp_offset = (0.0, 0.0, 150.0, 0.0, 0.0, 0.0)
+    findings = examine(ur_cell(tmp_path, ur))
+    assert by_name(findings, "UR safety").blocks
+    assert "slip of units" in by_name(findings, "UR tool").line()
+
+
 @pytest.fixture
-def gige_camera() -> Iterator[str]:
-    """Answers GVCP discovery as a camera does."""
-    address = "127.0.0.79"
-    record = bytearray(248)
-    record[72:76], record[104:108] = b"Acme", b"Eye1"
-
-    def serve(link: socket.socket) -> None:
-        ask, sender = link.recvfrom(64)
-        if ask[:4] == b"\x42\x01\x00\x02":
-            link.sendto(b"\x00\x00\x00\x03\x00\xf8" + ask[6:8] + bytes(record), sender)
-
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        link.bind((address, 3956))
-        threading.Thread(target=serve, args=(link,), daemon=True).start()
-        yield address
+def abb() -> Iterator[ABBController]:
+    arm = SimArm(kinematics_of("irb140"), WallClock(), np.zeros(6))
+    with ABBController(arm, "127.0.0.80") as controller:
+        yield controller
 
 
-def test_a_gige_camera_tells_its_name(tmp_path: Path, gige_camera: str) -> None:
-    camera = f"{{driver: gige, address: {gige_camera}, model: eye"
-    findings = examine(cell_with(tmp_path, camera=camera))
-    assert by_name(findings, "GigE camera").found == "Acme Eye1"
+def abb_cell(folder: Path, controller: ABBController, more: str = "") -> CellFile:
+    address = f"{controller.address}:{controller.port}"
+    return cell_with(folder, f"{{driver: abb, model: irb140, address: '{address}'{more}}}")
+
+
+def test_an_abb_arm_in_manual_mode_is_named(tmp_path: Path, abb: ABBController) -> None:
+    cell = abb_cell(tmp_path, abb)
+    assert not [finding.line() for finding in examine(cell) if finding.blocks]
+    abb.to_manual()
+    assert "turn the key to automatic" in by_name(examine(cell), "ABB mode").line()
+
+
+def test_a_wrong_password_is_named(tmp_path: Path, abb: ABBController) -> None:
+    findings = examine(abb_cell(tmp_path, abb, ", password: wrong"))
+    login = by_name(findings, "ABB login")
+    assert login.blocks
+    assert "password is wrong" in login.line()
+
+
+@pytest.fixture
+def gige() -> Iterator[GigEPeer]:
+    def picture(camera: CallableCamera) -> np.ndarray:
+        return np.zeros((48, 64), np.uint8)
+
+    with GigEPeer(CallableCamera(picture), 64, 48, address="127.0.0.79", model="Eye1") as peer:
+        yield peer
+
+
+def gige_cell(folder: Path, peer: GigEPeer, more: str = "") -> CellFile:
+    return cell_with(folder, camera=f"{{driver: gige, address: {peer.address}{more}, model: eye")
+
+
+def test_a_gige_camera_tells_its_name_and_that_it_is_free(tmp_path: Path, gige: GigEPeer) -> None:
+    findings = examine(gige_cell(tmp_path, gige))
+    assert "Eye1" in by_name(findings, "GigE camera").found
+    assert by_name(findings, "GigE control").found == "free"
     assert by_name(findings, "packet size").ready
+
+
+def test_a_camera_held_by_another_program_is_named(tmp_path: Path, gige: GigEPeer) -> None:
+    other = AravisCamera(gige.address)
+    other.connect()
+    held = by_name(examine(gige_cell(tmp_path, gige)), "GigE control")
+    other.close()
+    assert held.blocks
+    assert "close the vendor's viewer" in held.line()
+    assert by_name(examine(gige_cell(tmp_path, gige)), "GigE control").ready
+
+
+def test_packets_and_buffers_that_are_too_small_are_named(
+    tmp_path: Path, gige: GigEPeer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cell.doctor.gige.packet_bytes_for", lambda address: 1500)
+    monkeypatch.setattr(aravis_network, "receive_buffer_limit_bytes", lambda: 1000)
+    findings = examine(gige_cell(tmp_path, gige))
+    assert "MTU" in by_name(findings, "packet size").line()
+    assert "net.core.rmem_max" in by_name(findings, "socket buffer").line()
+    too_long = by_name(examine(gige_cell(tmp_path, gige, ", packet_bytes: 9000")), "packet size")
+    assert too_long.blocks
+    assert "the network carries 1500" in too_long.line()
+
+
+def test_a_camera_that_is_mute_is_in_the_way(tmp_path: Path, gige: GigEPeer) -> None:
+    gige.faults.mute = True
+    assert "check power" in by_name(examine(gige_cell(tmp_path, gige)), "GigE camera").line()
+
+
+@pytest.mark.parametrize("has_settings", [True, False])
+def test_a_robotiq_camera_whose_focus_cannot_be_locked_is_told(
+    tmp_path: Path, has_settings: bool
+) -> None:
+    source = CallableCamera(lambda camera: np.zeros((48, 64), np.uint8))
+    with RobotiqPeer(source, has_settings=has_settings) as peer:
+        camera = f"{{driver: robotiq, address: '{peer.address}', model: wrist"
+        settings = by_name(examine(cell_with(tmp_path, camera=camera)), "Robotiq settings")
+    assert settings.ready is has_settings
+    assert has_settings or "focus cannot be locked" in settings.line()
+
+
+def test_a_cache_that_cannot_be_written_is_in_the_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "cache"))
+    assert "export NUMBA_CACHE_DIR" in by_name(examine(), "numba cache").line()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "new" / "cache"))
+    assert by_name(examine(), "numba cache").ready
 
 
 def test_a_missing_producer_is_in_the_way(tmp_path: Path) -> None:

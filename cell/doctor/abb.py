@@ -1,0 +1,39 @@
+"""Whether an ABB arm would let itself be driven; only questions are asked."""
+
+from __future__ import annotations
+
+from cell.doctor.finding import Finding
+from cell.doctor.ports import host_port, port
+from cell.files.cell_file import AbbRobot
+from drivers.errors import DeviceError
+
+
+def abb(robot: AbbRobot) -> list[Finding]:
+    """The port of Robot Web Services, login, mode, motors, and whether a program runs."""
+    answers = port("ABB Robot Web Services", *host_port(robot.address, 80))
+    return [answers, *_state(robot)] if answers.ready else [answers]
+
+
+def _state(robot: AbbRobot) -> list[Finding]:
+    from drivers.abb.rws import named, open_rws
+    from drivers.abb.settings import ABBSettings
+    from drivers.abb.status import fault_in
+
+    url = f"http://{robot.address}"
+    try:
+        rws = open_rws(url, ABBSettings(robot.user, robot.password))
+        with named(url):
+            fault = fault_in(rws)
+            execution = str(rws.get_execution_state().ctrlexecstate)
+    except DeviceError as refusal:
+        mend = "correct what it says; robot.user and robot.password stand in the cell file"
+        return [Finding("ABB login", False, str(refusal), mend)]
+    return [
+        Finding("ABB mode and motors", fault is None, fault or "automatic, motors on", "see there"),
+        Finding(
+            "ABB program",
+            execution != "running",
+            execution,
+            "stop the RAPID program that runs",
+        ),
+    ]
