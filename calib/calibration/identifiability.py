@@ -8,12 +8,13 @@ whether the focal length moves is the question that views of one distance leave 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from calib.calibration.made_views import views_that_see
 from calib.chain.effects import make_effect
-from calib.chain.rigid import compose, inverse
+from calib.chain.rigid import compose
 from calib.discovery.design.information import pose_information
 from calib.solver.joint import JointFit
 from calib.solver.unknowns import Unknown
@@ -152,14 +153,4 @@ def _aimed(joint: JointFit, views: Views, turns: FloatArray, distance_m: FloatAr
     seen = compose(turns, np.zeros((len(turns), 3)))
     seen[:, 2, 3] = distance_m
     seen[:, :3, 3] -= seen[:, :3, :3] @ views.board.corners_m.mean(axis=0)
-    loop = inverse(seen) if views.mount == "eye_in_hand" else seen
-    model = joint.model
-    blank = Views.blank(
-        views.board,
-        width_px=views.width_px,
-        height_px=views.height_px,
-        frames=len(turns),
-        mount=views.mount,
-    )
-    flange = model.base_from_fixed @ loop @ inverse(model.flange_from_mounted)
-    return replace(blank, base_from_flange=flange)
+    return views_that_see(joint.model, views, views.board, seen)

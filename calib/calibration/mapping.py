@@ -17,6 +17,7 @@ from calib.calibration.result import (
     Solution,
     Statistics,
 )
+from calib.calibration.uncertainty import UncertaintyMap
 from calib.paper.focus_law import FocusLaw
 from calib.paper.scale_factors import ScaleFactor
 from calib.paper.zones import Zones
@@ -52,6 +53,7 @@ def as_mapping(calibration: Calibration, recording: str) -> dict[str, Any]:
         "solutions": {name: _solution(c, name) for name in c.solutions},
         **_transforms(c.robot),
         "robot": None if c.robot is None else _robot(c.robot),
+        "uncertainty": None if c.uncertainty is None else _uncertainty(c.uncertainty),
         "not_separable": [_weakness(w) for w in c.weaknesses],
         "missing": dict(c.missing),
     }
@@ -64,6 +66,10 @@ def _weakness(weakness: Weakness) -> dict[str, Any]:
         "separate_with": weakness.views,
         "gain": weakness.gain,
     }
+
+
+def _uncertainty(found: UncertaintyMap) -> dict[str, Any]:
+    return {name: value.tolist() for name, value in vars(found).items()}
 
 
 def _scale_factor(factor: ScaleFactor) -> dict[str, Any]:

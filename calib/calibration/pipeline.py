@@ -12,6 +12,7 @@ from calib.calibration.paper_method import PaperResult, board_depth_m, run_paper
 from calib.calibration.result import VALUES, Calibration, PositionError, Solution
 from calib.calibration.robot import RobotFit, fit_robot, hand_eye_of
 from calib.calibration.shared import joint_covariance, joint_focus
+from calib.calibration.uncertainty import UncertaintyMap, uncertainty_map
 from calib.chain.model import walk
 from calib.chain.optics import COLUMN
 from calib.errors import CalibrationError
@@ -59,6 +60,7 @@ def calibrate(views: Views) -> Calibration:
     if "joint_ml" not in solutions:
         solutions["zhang_mle_no_skew"] = baseline.without_skew(views)
     reference = None if robot is None else robot.reference
+    span_m = _distance_range_m(views, solutions.get("joint_ml", baseline.mle))
     return Calibration(
         frame=views.frame,
         used=baseline.used,
@@ -72,8 +74,9 @@ def calibrate(views: Views) -> Calibration:
         position_error={} if robot is None else _position_errors(views, solutions, robot),
         missing=missing,
         image_size_px=(views.width_px, views.height_px),
-        distance_range_m=_distance_range_m(views, solutions.get("joint_ml", baseline.mle)),
+        distance_range_m=span_m,
         weaknesses=_weaknesses(views, robot),
+        uncertainty=_uncertainty(views, robot, span_m),
     )
 
 
@@ -81,6 +84,14 @@ def _weaknesses(views: Views, robot: RobotFit | None) -> tuple[Weakness, ...]:
     if robot is None or robot.joint is None:
         return ()
     return find_weaknesses(robot.joint, views.take(robot.taken))
+
+
+def _uncertainty(
+    views: Views, robot: RobotFit | None, span_m: tuple[float, float]
+) -> UncertaintyMap | None:
+    if robot is None or robot.joint is None:
+        return None
+    return uncertainty_map(robot.joint, views, span_m)
 
 
 def _distance_range_m(views: Views, solution: Solution) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.calibration.identifiability import Weakness
+from calib.calibration.uncertainty import UncertaintyMap
 from calib.handeye import HandEye, chain
 from calib.paper.focus_law import FocusLaw, FocusLawChoice, Parameter
 from calib.paper.scale_factors import ScaleFactor
@@ -197,6 +198,8 @@ class Calibration:
         Nearest and farthest depth of the board's centre in the frames used.
     weaknesses:
         What the views of the joint fit cannot separate, and which views would.
+    uncertainty:
+        Of the joint fit's camera over image and distance; None without a joint fit.
     """
 
     frame: np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -213,3 +216,4 @@ class Calibration:
     image_size_px: tuple[int, int]
     distance_range_m: tuple[float, float]
     weaknesses: tuple[Weakness, ...] = ()
+    uncertainty: UncertaintyMap | None = None

@@ -197,6 +197,25 @@ class NotSeparable(_Part):
     """By what factor four such views lower the combination's uncertainty."""
 
 
+class UncertaintyPart(_Part):
+    """One sigma of the joint fit's camera where it is used: D distances, G places in the image.
+
+    From the full covariance of lens, focus law and the camera's place on the robot; a next
+    picture's corner noise and the robot's repeatability come on top.
+    """
+
+    distance_m: tuple[PositiveFloat, ...]
+    """(D,) depths, the lens focused at each."""
+    pixels_px: tuple[tuple[float, float], ...]
+    """(G, 2) places in the image."""
+    part_m: tuple[PositiveFloat, ...]
+    """(D,) side of the part that is located: the board's, at most a fifth of the image."""
+    projection_sigma_px: tuple[tuple[tuple[Sigma, Sigma], ...], ...]
+    """(D, G, 2) along u and v: of where a thing appears that the robot has the place of."""
+    workpiece_sigma_m: tuple[tuple[tuple[Sigma, Sigma, Sigma], ...], ...]
+    """(D, G, 3) right, down, away: of where the robot is told a part is, from one picture."""
+
+
 class CalibrationFile(_Part):
     """The whole of `calibration.json`; metres, radians, pixels."""
 
@@ -228,6 +247,8 @@ class CalibrationFile(_Part):
     base_from_camera: TransformPart | None
     """With a fixed camera: the camera in the base."""
     robot: RobotPart | None
+    uncertainty: UncertaintyPart | None = None
+    """Null without a joint fit."""
     not_separable: tuple[NotSeparable, ...] = ()
     """What the views of the joint fit cannot tell apart, the worst first."""
     missing: dict[str, str]
