@@ -105,6 +105,9 @@ class RobotiqSettings:
         return True
 
     def _focus_automatically(self, deadline_s: float) -> int:
+        if self.read(deadline_s)["focusAuto"]:
+            # one that is on already may be resting where it stood for another view
+            self._change({"focusAuto": False}, deadline_s)
         self._change({"focusAuto": True}, deadline_s)
         seen: list[int] = []
         while time.monotonic() < deadline_s:

@@ -99,6 +99,18 @@ def test_nobody_at_the_address_is_said_with_what_to_check() -> None:
     camera.close()
 
 
+def test_a_focus_that_rests_where_it_stood_for_another_view_is_looked_for_anew(
+    scene: Scene,
+) -> None:
+    source = CallableCamera(scene.picture, best_focus=512.0)
+    with RobotiqPeer(source, autofocus_period_s=60.0) as peer:
+        camera = RobotiqCamera(peer.address)
+        camera.connect()
+        source._best_focus = 700.0
+        assert camera.focus(FocusSetting("auto")) == 700.0
+        camera.close()
+
+
 def test_a_lock_that_is_not_taken_is_refused(camera: RobotiqCamera, peer: RobotiqPeer) -> None:
     peer.faults.ignore_focus_lock = True
     for setting in (FocusSetting("hold"), FocusSetting("position", 400.0)):
