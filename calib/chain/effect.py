@@ -73,6 +73,10 @@ class Effect:
         Columns of `Views` that must have been logged.
     varies:
         False where the effect cannot be told from the plain chain unless the frames moved.
+    moving_only:
+        Nothing shows it unless something moved while the frames were captured.
+    seen_without_robot:
+        The pictures alone show it: a free camera pose for each frame cannot absorb it.
     confounded_with:
         Names of effects that look alike.
     remedy:
@@ -92,6 +96,7 @@ class Effect:
     law: str | None = None
     needs: tuple[str, ...] = ()
     moving_only: bool = False
+    seen_without_robot: bool = False
     confounded_with: tuple[str, ...] = ()
     candidates: Callable[[Views], Sequence[Mapping[str, float]]] = _one_candidate
 

@@ -19,6 +19,8 @@ from calib.solver.unknowns import Dependence
 from calib.views import FloatArray, Views
 
 _ORDER = 6
+_FINE_ORDER = 12
+"""Fine enough for a dent a tenth of the picture wide; too many modes for a first alarm."""
 IMAGE_FIELD = "image_field"
 BOARD_HEIGHT = "board_height"
 
@@ -34,7 +36,7 @@ class FieldScore:
     where: str
 
 
-def cosine_modes(x: FloatArray, y: FloatArray, order: int = _ORDER) -> FloatArray:
+def cosine_modes(x: FloatArray, y: FloatArray, order: int) -> FloatArray:
     """(..., order^2 - 1) two-dimensional cosines of x and y in 0..1, without the constant."""
     waves = [
         np.cos(np.pi * i * x) * np.cos(np.pi * j * y)
@@ -56,17 +58,17 @@ class _Fields:
     base: FloatArray
 
 
-def _fields(found: Dependence, views: Views) -> _Fields:
+def _fields(found: Dependence, views: Views, order: int) -> _Fields:
     state = found.state
     pixels, j_pose, j_optics = project_with_jacobians(
         state.optics, state.camera_from_board, state.points_m
     )
     base = _base_columns(found, j_pose, j_optics, state.camera_from_board)
     u, v = pixels[..., 0] / views.width_px, pixels[..., 1] / views.height_px
-    modes = cosine_modes(np.clip(u, 0, 1), np.clip(v, 0, 1))
+    modes = cosine_modes(np.clip(u, 0, 1), np.clip(v, 0, 1), order)
     corners = views.board.corners_m
     extent = np.maximum(corners.max(axis=0), 1e-9)
-    board = cosine_modes(corners[:, 0] / extent[0], corners[:, 1] / extent[1])
+    board = cosine_modes(corners[:, 0] / extent[0], corners[:, 1] / extent[1], _ORDER)
     j_point = np.einsum("nmck,nkl->nmcl", j_pose[..., :3], state.camera_from_board[:, :3, :3])
     zero = np.zeros_like(modes)
     shifts = np.concatenate(
@@ -78,7 +80,7 @@ def _fields(found: Dependence, views: Views) -> _Fields:
 
 def field_scores(fit: JointFit, views: Views) -> list[FieldScore]:
     """Test a field of pixel shifts over the image, and of heights over the board."""
-    fields = _fields(fit.dependence, views)
+    fields = _fields(fit.dependence, views, _ORDER)
     test = _Test(fit, fields.base)
     image = test.of(fields.image, fields.pixels)
     height = test.of_board(fields.height, fields.board_modes, views)
@@ -88,8 +90,8 @@ def field_scores(fit: JointFit, views: Views) -> list[FieldScore]:
     ]
 
 
-def picture_scores(fit: JointFit, views: Views, present: Present, site: str) -> tuple[Score, Score]:
-    """What an effect would gain in the pictures alone, by itself and beside a field.
+def picture_score(fit: JointFit, views: Views, present: Present, site: str) -> Score:
+    """What an effect would gain in the pictures alone, once a field is allowed for.
 
     Parameters
     ----------
@@ -101,15 +103,11 @@ def picture_scores(fit: JointFit, views: Views, present: Present, site: str) -> 
         `IMAGE_FIELD` or `BOARD_HEIGHT`.
     """
     blank = np.where([p.role == "amount" for p in present.effect.parameters], 0.0, present.values)
-    _, found, unknowns, first = extended(fit, views, (Present(present.effect, blank),))
-    fields = _fields(found, views)
-    columns = fields.base[..., 6 + first :]
-    base = fields.base[..., : 6 + first]
-    assert columns.shape[3] == len(unknowns) - first
+    _, found, _, first = extended(fit, views, (Present(present.effect, blank),))
+    fields = _fields(found, views, _FINE_ORDER)
+    known, columns = fields.base[..., : 6 + first], fields.base[..., 6 + first :]
     field = fields.image if site == IMAGE_FIELD else fields.height
-    alone = _Test(fit, base).score(columns)
-    beside = _Test(fit, np.concatenate([base, field], axis=3)).score(columns)
-    return alone, beside
+    return _Test(fit, np.concatenate([known, field], axis=3)).score(columns)
 
 
 def _base_columns(

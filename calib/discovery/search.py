@@ -14,7 +14,7 @@ import numpy as np
 
 from calib.chain.effect import Present
 from calib.discovery.candidates import Candidate, candidates, finer
-from calib.discovery.fields import picture_scores
+from calib.discovery.fields import picture_score
 from calib.discovery.score import Score, bic, score_effects
 from calib.discovery.start import Fitter
 from calib.solver.joint import JointFit
@@ -28,8 +28,6 @@ UNDECIDED = 6.0
 
 _FITTED_IN_EARNEST = 6
 _MOST_EFFECTS = 6
-_OF_THE_PICTURE = ("board", "lens", "sensor")
-"""Links whose effects a field over the image or the board could be taken for."""
 
 
 @dataclass(frozen=True)
@@ -152,17 +150,13 @@ class Search:
 
     def drop_beside_field(self, site: str) -> None:
         """Drop what the pictures no longer ask for once a field of shifts is allowed for."""
-        fit = self.best.fit
-        for present in fit.model.effects:
-            if present.effect.link not in _OF_THE_PICTURE:
+        for present in self.best.fit.model.effects:
+            if not present.effect.seen_without_robot:
                 continue
-            rest = tuple(p for p in self.best.fit.model.effects if p is not present)
+            rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
             without = self.fitter.with_effects(self.best.fit, rest)
-            alone, beside = picture_scores(without, self.views, present, site)
-            asked_by_picture = alone.gain > 0.5 * (
-                without.minus_two_log - self.best.fit.minus_two_log
-            )
-            if asked_by_picture and bic(beside.gain, beside.columns, self.views) < DEMAND:
+            beside = picture_score(without, self.views, present, site)
+            if bic(beside.gain, beside.columns, self.views) < DEMAND:
                 self._settle(without)
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
 

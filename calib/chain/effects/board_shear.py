@@ -23,5 +23,6 @@ EFFECT = Effect(
         Parameter("aspect", "1", 1e-3, -0.1, 0.1),
     ),
     act=_act,
+    seen_without_robot=True,
     remedy="Print the board on another machine, or let the twin carry its shape.",
 )

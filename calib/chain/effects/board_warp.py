@@ -27,5 +27,6 @@ EFFECT = Effect(
         Parameter("twist_m", "m", 3e-4, -0.02, 0.02),
     ),
     act=_act,
+    seen_without_robot=True,
     remedy="Glue the board to something stiff and flat, or let the twin carry its shape.",
 )

@@ -23,6 +23,7 @@ EFFECT = Effect(
         Parameter("p2", "1", 5e-4, -0.05, 0.05),
     ),
     act=_act,
+    seen_without_robot=True,
     confounded_with=("sensor_tilt",),
     remedy="Use a calibration with p1 and p2 (the twin and every export have them).",
 )

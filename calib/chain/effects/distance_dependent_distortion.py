@@ -19,6 +19,7 @@ EFFECT = Effect(
     source="Brown 1971 (Magill's formula); Fraser, Shortis 1992",
     parameters=(Parameter("slope_m", "m", 5e-3, -1.0, 1.0),),
     act=_act,
+    seen_without_robot=True,
     confounded_with=("entrance_pupil_shift", "protective_window"),
     remedy="Use one calibration for each working distance, or the twin.",
 )

@@ -19,6 +19,7 @@ EFFECT = Effect(
     source="Kumar, Ahuja 2015, On the equivalence of moving entrance pupil and radial distortion",
     parameters=(Parameter("pupil_m_rad2", "m/rad^2", 3e-3, -0.1, 0.1),),
     act=_act,
+    seen_without_robot=True,
     confounded_with=("protective_window", "distance_dependent_distortion"),
     remedy="Work at one distance, or use a non-central camera model (the twin has it).",
 )

@@ -19,5 +19,6 @@ EFFECT = Effect(
     source="Brown 1971, Close-range camera calibration",
     parameters=(Parameter("k3", "1", 0.3, -50.0, 50.0),),
     act=_act,
+    seen_without_robot=True,
     remedy="Use a calibration with k3.",
 )

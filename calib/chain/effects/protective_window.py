@@ -19,6 +19,7 @@ EFFECT = Effect(
     source="Snell's law for a plane-parallel plate (Born & Wolf, section 4.7)",
     parameters=(Parameter("thickness_m", "m", 3e-3, -0.1, 0.1),),
     act=_act,
+    seen_without_robot=True,
     confounded_with=("entrance_pupil_shift", "distance_dependent_distortion"),
     remedy="Calibrate with the window that will be there at work; or take it off and compare.",
 )

@@ -23,6 +23,7 @@ EFFECT = Effect(
         Parameter("tilt_y_rad", "rad", 5e-3, -0.2, 0.2),
     ),
     act=_act,
+    seen_without_robot=True,
     confounded_with=("decentering",),
     remedy="Use a calibration with tilt terms, or have the sensor's seat checked.",
 )
