@@ -17,13 +17,27 @@ from cell.report.sections.made import made
 from cell.report.sections.poses import poses
 from cell.report.sections.story import story
 from cell.report.sections.tables import tables
+from cell.report.sections.uncertainty import uncertainty
 
-_SECTIONS = (answer, chain, story, poses, lens, detector, coverage, tables, frames, made)
+_SECTIONS = (
+    answer,
+    chain,
+    story,
+    poses,
+    lens,
+    uncertainty,
+    detector,
+    coverage,
+    tables,
+    frames,
+    made,
+)
 _LINKS = (
     ("answer", "Answer"),
     ("diagnosis", "Diagnosis"),
     ("arm", "Arm and mount"),
     ("lens", "Lens"),
+    ("uncertainty", "Uncertainty"),
     ("detector", "Residuals"),
     ("coverage", "Coverage"),
     ("tables", "Tables"),

@@ -120,7 +120,7 @@ def test_the_errors_of_many_runs_are_as_large_as_told(mount: Mount) -> None:
         sigma_m = workpiece_sigma_m(fit, views, PIXELS, DISTANCES)
         found.append(((pixels / sigma_px).ravel(), (metres / sigma_m).ravel()))
     for z in (np.array(column) for column in zip(*found, strict=True)):
-        # some six independent numbers a run: 7 % by chance over sixteen runs
+        # one run's errors go together: a few independent numbers in each of sixteen
         assert 0.78 < np.sqrt((z**2).mean()) < 1.25
         assert np.sqrt((z**2).mean(axis=0)).max() < 2.0
 

@@ -10,6 +10,7 @@ from cell.report.data import ReportData
 from cell.report.figures.workpiece import corrected, of_solution
 from cell.report.geometry import workpiece_error_m
 from cell.report.numbers import known, measured, millimetres, number, solution_name
+from cell.report.sections.uncertainty import uncertainty_sentences
 
 _MANY_TIMES = 3.0
 
@@ -18,6 +19,7 @@ def sentences(data: ReportData) -> list[str]:
     """Sentences a technician can act on; what was not logged is among them."""
     return [
         *_scale(data),
+        *uncertainty_sentences(data),
         *_corrected(data),
         *_zhang(data),
         *_truth(data),
