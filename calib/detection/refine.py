@@ -263,7 +263,10 @@ def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray
     shortest = _shortest_step(lattice_steps(before_px))
     moved = np.linalg.norm(fitted.corners_px - before_px, axis=-1)
     contrast = fitted.first_dark_contrast * (1.0 if first_dark else -1.0)
-    typical = float(np.nanmedian(np.abs(contrast)))
+    # of the corners that are there: half of a board may be out of the picture
+    strength = np.abs(contrast)
+    there = strength > 0.3 * float(np.nanquantile(strength, 0.9))
+    typical = float(np.median(strength[there])) if there.any() else 0.0
     fine = (
         np.isfinite(fitted.residual)
         & (moved < 0.3 * shortest)
