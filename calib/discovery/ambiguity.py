@@ -36,7 +36,7 @@ _EXPERIMENTS = {
         "repeat the first poses at the end, turned by 90 degrees about the optical axis"
     ),
 }
-_GENERAL = "more views in which the two differ: design them with `cell plan --power`"
+_GENERAL = "more views in which the two differ: the plan of `separate_with`, if there is one"
 
 
 def experiment(first: Effect, second: Effect) -> str:
