@@ -17,6 +17,15 @@ from calib.views import BoolArray, FloatArray
 OUTLIER_SIGMA = 5.0
 _RAYLEIGH_MEDIAN = 1.17741
 
+_NEAR_ENOUGH = 1e-8
+"""Last step of the robust fit, of the corners' spread: below a ten-thousandth of a pixel."""
+
+_DAMPING = 1e-14
+"""Of the normal matrix's trace, so that corners which fix no homography stop nothing here; where
+they do fix one, the end is the same."""
+
+_DIAGONAL = np.arange(8)
+
 
 @dataclass(frozen=True)
 class Homography:
@@ -176,19 +185,60 @@ def _jacobian(matrix: FloatArray, plane_m: FloatArray) -> FloatArray:
 def _refine(
     start: FloatArray, p: FloatArray, q: FloatArray, w: FloatArray, *, robust: bool
 ) -> FloatArray:
-    """Gauss-Newton in normalised coordinates; the linear start is within its basin."""
+    """Gauss-Newton in normalised coordinates; the linear start is within its basin.
+
+    A robust fit only tells the wrong corners, so it need not be at its very end.
+    """
     to_plane, to_image = _normaliser(p), _normaliser(q)
     pn, qn = apply_homography(to_plane, p), apply_homography(to_image, q)
     H = to_image @ start @ np.linalg.inv(to_plane)
     H = H / H[2, 2]
+    ones = np.column_stack([pn, np.ones(len(pn))])
+    products = (ones[:, :, None] * ones[:, None, :]).reshape(-1, 9)
     for _ in range(20 if robust else 6):
-        r = qn - apply_homography(H, pn)
-        distance = np.linalg.norm(r, axis=1) * np.sqrt(w)
-        cauchy = 1 / (1 + (distance / max(2.385 * _scale(distance), 1e-12)) ** 2)
-        root = np.repeat(np.sqrt(w * cauchy if robust else w), 2)
-        step = np.linalg.lstsq(_jacobian(H, pn) * root[:, None], r.ravel() * root, rcond=None)[0]
+        mapped = ones @ H.T
+        image = mapped[:, :2] / mapped[:, 2:]
+        r = qn - image
+        weight = w * _cauchy(r, w) if robust else w
+        step = _step(ones, products, mapped[:, 2], image, r, weight)
         H = H + np.append(step, 0.0).reshape(3, 3)
-        if np.abs(step).max() < 1e-12:
+        if np.abs(step).max() < (_NEAR_ENOUGH if robust else 1e-12):
             break
     matrix = np.linalg.inv(to_image) @ H @ to_plane
     return np.asarray(matrix / matrix[2, 2])
+
+
+def _cauchy(r: FloatArray, w: FloatArray) -> FloatArray:
+    """(M,) robust weights of residuals, by their own spread."""
+    square = (r**2).sum(axis=1) * w
+    spread = 2.385 * np.sqrt(np.median(square)) / _RAYLEIGH_MEDIAN
+    return np.asarray(1 / (1 + square / max(spread, 1e-12) ** 2))
+
+
+def _step(
+    ones: FloatArray,
+    products: FloatArray,
+    depth: FloatArray,
+    image: FloatArray,
+    r: FloatArray,
+    weight: FloatArray,
+) -> FloatArray:
+    """(8,) Gauss-Newton step from the normal equations, written block by block.
+
+    A row of `_jacobian` is (a, 0, -u p) or (0, a, -v p) over the depth, with a = (x, y, 1) and
+    p = (x, y): all its products are sums of the nine products of a.
+    """
+    u, v = image[:, 0], image[:, 1]
+    each = weight / depth
+    square = each / depth
+    sums = np.stack([square, -u * square, -v * square, (u * u + v * v) * square]) @ products
+    plain, by_u, by_v, both = sums.reshape(4, 3, 3)
+    N = np.zeros((8, 8))
+    N[:3, :3] = N[3:6, 3:6] = plain
+    N[:3, 6:], N[3:6, 6:] = by_u[:, :2], by_v[:, :2]
+    N[6:, :3], N[6:, 3:6] = by_u[:2], by_v[:2]
+    N[6:, 6:] = both[:2, :2]
+    ru, rv = each * r[:, 0], each * r[:, 1]
+    right = np.stack([ru, rv, -u * ru - v * rv]) @ ones
+    N[_DIAGONAL, _DIAGONAL] += _DAMPING * N.trace()
+    return np.linalg.solve(N, np.concatenate([right[0], right[1], right[2, :2]]))

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from calib.errors import CalibrationError
 from calib.paper.homography import apply_homography, fit_homography, linear_homography
+from calib.views import FloatArray
 
 PLANE = np.stack(np.meshgrid(np.arange(10), np.arange(7)), axis=-1).reshape(-1, 2) * 0.025
 TRUE = np.array([[4000.0, 300.0, 900.0], [-250.0, 4100.0, 700.0], [0.4, -0.3, 1.0]])
@@ -55,3 +57,28 @@ def test_corners_on_a_line_are_refused() -> None:
     line = np.column_stack([np.arange(9) * 0.1, np.zeros(9)])
     with pytest.raises(CalibrationError, match="line"):
         linear_homography(line, line * 1000 + 5)
+
+
+def test_the_fit_ends_where_another_program_s_least_squares_does() -> None:
+    rng = np.random.default_rng(5)
+    sigma = rng.uniform(0.5, 2.0, len(PLANE))
+    noisy = PIXELS + rng.normal(0, 0.1, PIXELS.shape) * sigma[:, None]
+    fit = fit_homography(PLANE, noisy, sigma)
+    assert fit.inlier.all()
+
+    def residual(first_eight: FloatArray) -> FloatArray:
+        matrix = np.append(first_eight, 1.0).reshape(3, 3)
+        off = noisy - apply_homography(matrix, PLANE)
+        return np.asarray((off / sigma[:, None]).ravel())
+
+    other = least_squares(
+        residual, TRUE.ravel()[:8], x_scale="jac", ftol=1e-15, xtol=1e-15, gtol=1e-15
+    )
+    one_sigma = np.sqrt(np.diag(fit.covariance))
+    assert np.abs((fit.matrix.ravel()[:8] - other.x) / one_sigma).max() < 1e-5
+
+
+def test_corners_that_nearly_fix_no_homography_do_not_stop_it() -> None:
+    line = np.column_stack([np.arange(12) * 0.025, np.tile([0.0, 1e-7], 6)])
+    fit = fit_homography(line, apply_homography(TRUE, line))
+    assert np.abs(apply_homography(fit.matrix, line) - apply_homography(TRUE, line)).max() < 1e-3
