@@ -58,7 +58,8 @@ def test_a_probability(p: float | None, shown: str) -> None:
         ("bend_x_m", "bend x"),
         ("rad_per_g", "size"),
         ("relative", "relative"),
-        ("k3", "k3"),
+        ("k3", "k₃"),
+        ("k4", "k4"),
     ],
 )
 def test_a_parameter_in_words(key: str, shown: str) -> None:
