@@ -1,0 +1,82 @@
+"""A recording's time per pose, against the time that physics asks for.
+
+The bound of a pose is the fastest move within the plan's speeds, the standstill that arm and plan
+ask for, focusing, the exposure, and the picture's way over the link.
+
+    python benchmarks/time_per_pose.py PLAN.yaml RECORDING --transfer-s 0.0074
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from calib.chain.kinematics import ArmKinematics
+from calib.views import FloatArray
+from cell.files.plan_file import Plan, read_plan
+from cell.recording import FrameRecord, read_recording
+from cell.sequencer.guard import Guard
+from sim.arm import ACCELERATION_RAD_S2, SETTLE_S
+from sim.camera import FOCUSING_S
+from sim.motion import plan_move
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    asked.add_argument("plan", type=Path)
+    asked.add_argument("recording", type=Path)
+    asked.add_argument("--transfer-s", type=float, required=True)
+    words = asked.parse_args()
+    plan = read_plan(words.plan)
+    frames = sorted(read_recording(words.recording).frames, key=lambda frame: frame.t_s)
+    guard = Guard.of(plan)
+    rows = np.array([_row(plan, guard, a, b, words.transfer_s) for a, b in pairwise(frames)])
+    taken, bound = rows.T
+    print(f"{len(rows)} poses: {taken.sum():.1f} s against {bound.sum():.1f} s,", end=" ")
+    print(f"ratio {taken.sum() / bound.sum():.3f};", end=" ")
+    late = np.percentile(taken - bound, [50, 90, 100])
+    print("over the bound by {:.3f} s (median), {:.3f} (90 %), {:.3f} (worst)".format(*late))
+    waited = sum(_picture_s(frame, words.transfer_s) for frame in frames[1:])
+    print(f"{waited:.1f} s of that went by between order and arrival of the pictures")
+
+
+def _row(
+    plan: Plan, guard: Guard, before: FrameRecord, after: FrameRecord, transfer_s: float
+) -> tuple[float, float]:
+    """Seconds from one frame to the next, and the least they could be."""
+    here, there = (np.array(frame.joints_rad) for frame in (before, after))
+    exposure = plan.file.exposure
+    bound_s = _move_s(guard, guard.kinematics, here, there) + SETTLE_S
+    bound_s += plan.file.settle.still_s + float(after.exposure_s) + transfer_s
+    bound_s += FOCUSING_S if exposure.focus == "auto" else 0.0
+    return after.t_s - before.t_s, bound_s
+
+
+def _picture_s(frame: FrameRecord, transfer_s: float) -> float:
+    """Seconds that a picture came later than exposure and transfer make it; a peer renders it."""
+    raw = (frame.model_extra or {}).get("camera_raw", {})
+    ordered_s = raw.get("trigger_sent_s", raw.get("asked_s"))
+    return (
+        0.0 if ordered_s is None else raw["arrived_s"] - ordered_s - frame.exposure_s - transfer_s
+    )
+
+
+def _move_s(guard: Guard, kinematics: ArmKinematics, here: FloatArray, there: FloatArray) -> float:
+    target = guard.target(here, there, "between two frames")
+    move = plan_move(
+        kinematics,
+        here,
+        there,
+        0.0,
+        flange_speed_m_s=target.tcp_speed_m_s,
+        joint_speed_rad_s=target.joint_speed_rad_s,
+        acceleration_rad_s2=ACCELERATION_RAD_S2,
+    )
+    return move.profile.duration_s
+
+
+if __name__ == "__main__":
+    main()
