@@ -13,9 +13,12 @@ from cell.files.diagnosis_file import SCHEMA, DiagnosisFile
 
 
 def as_mapping(
-    found: Diagnosis, recording: str, separations: Sequence[Separation]
+    found: Diagnosis,
+    recording: str,
+    separations: Sequence[Separation],
+    notes: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """The content of `diagnosis.json`, checked against its model."""
+    """The content of `diagnosis.json`, checked against its model; `notes` go behind its own."""
     noise = found.twin.noise
     heard = noise.flange_m < UNKNOWN_POSE[0]
     content = {
@@ -39,7 +42,7 @@ def as_mapping(
         },
         "frames_used": [int(f) for f in found.views.frame],
         "frames_rejected": [vars(r) for r in found.rejected],
-        "notes": list(found.said),
+        "notes": [*found.said, *notes],
     }
     return DiagnosisFile.model_validate(content).model_dump(mode="json", by_alias=True)
 

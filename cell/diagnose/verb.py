@@ -26,6 +26,7 @@ from cell.calibrate import (
     report_data,
     same_order_everywhere,
 )
+from cell.diagnose.brightness import brightness_notes
 from cell.diagnose.mapping import as_mapping
 from cell.diagnose.prediction import AFTER, BEFORE, write_prediction
 from cell.diagnose.separate import separations
@@ -97,7 +98,8 @@ def diagnose_into(
     except CalibrationError as error:
         raise BadAnswer(f"{recording.path}: {error}") from None
     plans = separations(found, recording)
-    mapping = as_mapping(found, recording.name, plans)
+    notes = brightness_notes(recording, found)
+    mapping = as_mapping(found, recording.name, plans, notes)
     _write(folder, {DIAGNOSIS: json.dumps(mapping, indent=1) + "\n"})
     _write(folder, {TWIN: twin_text(found, recording)})
     _write(folder, {plan.file: plan.text for plan in plans if plan.file is not None})
