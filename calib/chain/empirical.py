@@ -167,6 +167,10 @@ COVARIATES: tuple[Covariate, ...] = (
 )
 
 
+CONSTANT = Covariate("constant", "1", lambda walk: np.ones((len(walk.views), 1)))
+"""The same in every frame: one column for each number of a site."""
+
+
 def covariate_named(name: str) -> Covariate:
     """Return the covariate of that name; raises KeyError."""
     return {covariate.name: covariate for covariate in COVARIATES}[name]
@@ -218,7 +222,7 @@ class Curve:
         board absorbs: a curve that only starts at some angle has one, too.
         """
         functions = self.functions(walk)
-        if self.site.name not in _OWN_CONSTANT:
+        if self.site.name not in _OWN_CONSTANT or self.covariate is CONSTANT:
             return functions
         return np.concatenate([functions, np.ones((len(functions), 1))], axis=1)
 

@@ -9,7 +9,6 @@ import numpy as np
 from scipy.stats import chi2
 
 from calib.chain.effect import Present
-from calib.chain.effects import catalogue
 from calib.chain.model import kinematics_of, walk
 from calib.discovery.ambiguity import ambiguities
 from calib.discovery.bookkeeping.branches import choose_branches, with_branches
@@ -254,8 +253,3 @@ def _unseen(views: Views) -> tuple[str, ...]:
     for name, why in unseen(views).items():
         reasons.setdefault(why, []).append(name)
     return tuple(f"could not be seen ({why}): {', '.join(n)}" for why, n in reasons.items())
-
-
-def known_names() -> tuple[str, ...]:
-    """Names of the catalogue, for messages."""
-    return tuple(sorted({effect.name for effect in catalogue()}))

@@ -13,6 +13,7 @@ import numpy as np
 
 from calib.chain.effect import Link
 from calib.chain.empirical import (
+    CONSTANT,
     COVARIATES,
     Covariate,
     Curve,
@@ -84,8 +85,7 @@ class _Probe:
     def __init__(self, fit: JointFit, views: Views, state: Walk) -> None:
         self.fit, self.views, self.state = fit, views, state
         self.sites = site_columns(views)
-        constant = Covariate("constant", "1", lambda w: np.ones((len(w.views), 1)))
-        presents = [present_curve(Curve(s, constant, 0.0, 1.0), state) for s in self.sites]
+        presents = [present_curve(Curve(s, CONSTANT, 0.0, 1.0), state) for s in self.sites]
         _, self.found, unknowns, self.base = extended(fit, views, presents)
         self.amount = amounts(fit.model, fit.unknowns)
         self.information = prior_information(fit.unknowns)

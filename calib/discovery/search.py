@@ -36,7 +36,6 @@ class Trial:
 
     fit: JointFit
     criterion: float
-    choices: int = 1
 
 
 @dataclass(frozen=True)
