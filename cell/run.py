@@ -44,9 +44,9 @@ def record(
     """
     plan = read_plan(plan_path)
     say(f"{_devices_are(dry_run, peers)}; plan {plan_path}; recording {folder}")
-    with _devices(plan, dry_run, peers) as devices, run_progress(simulated=dry_run) as listener:
+    with _devices(plan, dry_run, peers) as devices, run_progress(simulated=dry_run) as terminal:
         return record_plan(
-            plan, folder, devices, simulated=dry_run, resume=resume, listener=listener
+            plan, folder, devices, simulated=dry_run, resume=resume, watchers=(terminal,)
         )
 
 

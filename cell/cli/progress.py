@@ -5,51 +5,56 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 
-from cell.sequencer.sequencer import Listener
 from cell.sequencer.states import Status
+from cell.sequencer.watcher import Watcher
 
 
 @contextmanager
-def run_progress(*, simulated: bool) -> Iterator[Listener]:
-    """A listener that shows a run on stderr."""
+def run_progress(*, simulated: bool) -> Iterator[Watcher]:
+    """A watcher that shows a run on stderr."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield _tell_plainly
+        yield _Plainly()
         return
-    bar = Progress(
+    with Progress(
         TextColumn("[yellow]SIMULATED" if simulated else "[green]REAL ARM"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.fields[left]}"),
         TextColumn("{task.description}"),
         console=console,
-    )
-    with bar:
-        task = bar.add_task("", left="", total=None)
-
-        def tell(status: Status) -> None:
-            bar.update(
-                task,
-                total=status.total,
-                completed=status.done + status.skipped,
-                description=f"{status.state.value} {status.view}",
-                left=f"{_clock(status.left_s)} left",
-            )
-            if status.event:
-                console.print(status.event, highlight=False)
-
-        yield tell
+    ) as bar:
+        yield _Bar(bar, bar.add_task("", left="", total=None))
 
 
-def _tell_plainly(status: Status) -> None:
-    if status.event:
-        done = f"[{status.done + status.skipped}/{status.total}]"
-        sys.stderr.write(f"{done} {status.event}, {_clock(status.left_s)} left\n")
-        sys.stderr.flush()
+@dataclass
+class _Bar(Watcher):
+    bar: Progress
+    task: TaskID
+
+    def told(self, status: Status) -> None:
+        self.bar.update(
+            self.task,
+            total=status.total,
+            completed=status.done + status.skipped,
+            description=f"{status.state.value} {status.view}",
+            left=f"{_clock(status.left_s)} left",
+        )
+        if status.event:
+            self.bar.console.print(status.event, highlight=False)
+
+
+class _Plainly(Watcher):
+    def told(self, status: Status) -> None:
+        if status.event:
+            done = f"[{status.done + status.skipped}/{status.total}]"
+            sys.stderr.write(f"{done} {status.event}, {_clock(status.left_s)} left\n")
+            sys.stderr.flush()
 
 
 def _clock(seconds: float | None) -> str:

@@ -8,7 +8,7 @@ is stopped before anything else happens.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Iterable
 from concurrent.futures import Future, wait
 from dataclasses import dataclass, field
 from functools import partial
@@ -23,19 +23,19 @@ from cell.sequencer.clock import Clock, HostClock
 from cell.sequencer.guard import Guard
 from cell.sequencer.journal import Journal
 from cell.sequencer.progress import Progress, TimeLeft
+from cell.sequencer.requests import SKIPPED_BY_OPERATOR, Requests
 from cell.sequencer.shot import Shot
 from cell.sequencer.states import RunResult, State, Status, finish_of
 from cell.sequencer.stop import StopRequest
-from cell.sequencer.watched_arm import WatchedArm, joints_of
+from cell.sequencer.watched_arm import POLL_S, WatchedArm, joints_of
 from cell.sequencer.watched_camera import CameraLost, asked_of_camera
+from cell.sequencer.watcher import Checked, Watcher, Watchers
 from cell.sequencer.worker import Worker
 from drivers.arm import Arm, ArmState
 from drivers.camera import Camera, FocusSetting, Frame
 from drivers.errors import FrameLost, StopFailed
 
 _LAST_FRAME_S = 30.0
-
-Listener = Callable[[Status], None]
 
 
 @dataclass(frozen=True)
@@ -62,10 +62,10 @@ class Sequencer:
         What a resumed run has behind it; everything lies ahead where not given.
     started_s:
         Time of `devices.clock` at which the recording's own clock is 0; now, where not given.
-    stop:
-        Asked to stop by others.
-    listener:
-        Told of every change of state, from the loop's thread; must not block.
+    stop, requests:
+        Asked to stop, to pause, to give a view up by others.
+    watchers:
+        Who is told what happens.
     """
 
     def __init__(
@@ -78,20 +78,26 @@ class Sequencer:
         progress: Progress | None = None,
         started_s: float | None = None,
         stop: StopRequest | None = None,
-        listener: Listener | None = None,
+        requests: Requests | None = None,
+        watchers: Iterable[Watcher] = (),
     ) -> None:
         self._plan = plan
         self._camera, self._clock = devices.camera, devices.clock
+        self._watchers = Watchers(watchers)
+        self._requests = Requests() if requests is None else requests
         self._arm = WatchedArm(
-            devices.arm, Guard.of(plan), devices.clock, StopRequest() if stop is None else stop
+            devices.arm,
+            Guard.of(plan),
+            devices.clock,
+            StopRequest() if stop is None else stop,
+            self._watchers.read,
         )
         self._writer, self._journal = writer, journal
         self._progress = progress or Progress(deque(range(len(plan.file.views))))
         self._started_s = self._clock.now() if started_s is None else started_s
-        self._listener = listener or _nobody
         self._worker = Worker()
         self._state = State.IDLE
-        self._view = ""
+        self._index: int | None = None
         self._checking: tuple[Shot, Future[Verdict]] | None = None
         self._time_left = TimeLeft([0.0] * len(plan.file.views), self._clock.now(), 0)
 
@@ -166,24 +172,41 @@ class Sequencer:
 
     def _go(self, index: int) -> FloatArray:
         """Move to a view and settle there; returns the (6,) joint angles the move came from."""
-        self._view = self._plan.view_name(index)
+        self._index = index
+        self._pause_if_asked()
         self._tell(State.MOVING)
         here = joints_of(self._arm.watch())
         there = self._arm.guard.joints_of(self._plan, index, here)
         came_from = self._arm.go(there, self._plan.where(index))
+        self._pause_if_asked()
         self._tell(State.SETTLING)
         self._arm.settle(self._plan.file.settle, self._plan.where(index))
         return came_from
 
+    def _pause_if_asked(self) -> None:
+        """Where the arm stands: wait while the operator wants it, the arm watched as ever."""
+        if not self._requests.paused:
+            return
+        began_s = self._clock.now()
+        self._journal.write("pause", view=self._index)
+        self._tell(State.PAUSED, "paused; the arm stands at the end of its move")
+        while self._requests.paused:
+            self._arm.watch()
+            self._requests.wait(POLL_S)
+        self._journal.write("go on", view=self._index)
+        self._time_left.began_s += self._clock.now() - began_s
+        self._tell(State.PAUSED, "going on")
+
     def _shoot(self, index: int, came_from: FloatArray) -> Shot | None:
         """Focus and grab until image and pose belong together; None where the view is given up.
 
-        A camera that is lost is opened anew, once a view, with the arm stopped before.
+        A camera that is lost is opened anew, once a view, with the arm stopped before. The
+        operator may give the view up until its picture is taken.
         """
         exposure = self._plan.file.exposure
         focus = partial(self._camera.focus, FocusSetting(exposure.focus, exposure.focus_position))
         reopened = False
-        while True:
+        while not self._requests.skips(index):
             try:
                 self._tell(State.FOCUSING)
                 self._arm.await_job(self._worker.do(asked_of_camera(focus)))
@@ -199,10 +222,12 @@ class Sequencer:
                 self._reopen_camera(index, lost)
                 reopened = True
                 continue
-            if fault is None:
+            if fault is None and not self._requests.skips(index):
                 return shot
-            if not self._again(index, fault):
+            if fault is not None and not self._again(index, fault):
                 return None
+        self._skip(index, SKIPPED_BY_OPERATOR)
+        return None
 
     def _grab(self, timeout_s: float) -> tuple[Frame, tuple[ArmState, ...]]:
         """A frame, and the arm's readings from before its trigger to after it came."""
@@ -219,7 +244,8 @@ class Sequencer:
         except StopFailed:
             raise lost from None  # the run ends, which stops the arm again and says what failed
         self._journal.write("camera lost", view=index, reason=str(lost))
-        self._tell(self._state, f"{self._view}: {lost}; opening the camera once more")
+        name = self._plan.view_name(index)
+        self._tell(self._state, f"{name}: {lost}; opening the camera once more")
         self._arm.await_job(self._worker.do(self._camera.connect))
         self._arm.settle(self._plan.file.settle, self._plan.where(index))
 
@@ -229,10 +255,12 @@ class Sequencer:
         """In the worker: judge the picture; a good one is on the disk when this returns."""
         board = self._plan.cell.board.board()
         verdict = check_frame(shot.frame.image, board, self._plan.file.checks)
+        record = None
         if verdict.fault is None:
             view = self._plan.file.views[shot.index]
             record = shot.record(view, self._started_s, verdict.detection)
-            self._writer.append(record, shot.frame.image)
+            record = self._writer.append(record, shot.frame.image)
+        self._watchers.checked(Checked(shot, verdict, record))
         return verdict
 
     def _finish_check(self) -> None:
@@ -265,15 +293,18 @@ class Sequencer:
             return True
         if retry.then == "stop":
             raise BadAnswer(f"{name}: {fault} (tried {retry.attempts} times; retry.then is stop)")
-        progress.skipped[index] = fault
-        self._journal.write("skip", view=index, reason=fault)
-        self._tell(self._state, f"{name} skipped: {fault}")
+        self._skip(index, fault)
         if not progress.done and len(progress.skipped) >= retry.give_up_after:
             raise BadAnswer(
                 f"none of the first {len(progress.skipped)} views gave a usable frame; the last"
                 f" one: {fault}. Check board, light and lens with one view before the next run."
             )
         return False
+
+    def _skip(self, index: int, reason: str) -> None:
+        self._progress.skipped[index] = reason
+        self._journal.write("skip", view=index, reason=reason)
+        self._tell(self._state, f"{self._plan.view_name(index)} skipped: {reason}")
 
     def _keep_the_frame_in_hand(self) -> None:
         """A whole frame that is being checked as the run ends is logged if it is good."""
@@ -293,24 +324,19 @@ class Sequencer:
                 self._journal.write("close failed", device=name, reason=str(fault))
 
     def _tell(self, state: State, event: str | None = None) -> None:
-        """Tell the listener; one that fails (a terminal that is gone) is not asked again."""
+        """Tell the watchers; one that fails (a terminal that is gone) is not told again."""
         self._state = state
         progress = self._progress
         status = Status(
             state,
-            self._view,
+            "" if self._index is None else self._plan.view_name(self._index),
             len(progress.done),
             len(progress.skipped),
             len(self._plan.file.views),
             self._time_left.estimate_s(progress, self._clock.now()),
             event,
+            self._index,
         )
-        try:
-            self._listener(status)
-        except Exception as fault:
-            self._listener = _nobody
-            self._journal.write("listener failed", reason=str(fault))
-
-
-def _nobody(status: Status) -> None:
-    """Listen to nothing."""
+        self._watchers.told(status)
+        while self._watchers.failures:
+            self._journal.write("listener failed", reason=self._watchers.failures.pop())

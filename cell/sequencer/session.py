@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,11 @@ from cell.recording import FrameRecord, Header, RecordingWriter
 from cell.recording.corners import FILE_NAME as DETECTIONS
 from cell.sequencer.journal import Journal, check_same_plan, skipped_views
 from cell.sequencer.progress import Progress
-from cell.sequencer.sequencer import Devices, Listener, Sequencer
+from cell.sequencer.requests import Requests
+from cell.sequencer.sequencer import Devices, Sequencer
 from cell.sequencer.states import RunResult
 from cell.sequencer.stop import StopRequest, signals_ask
+from cell.sequencer.watcher import Watcher
 
 
 def record_plan(
@@ -26,7 +29,8 @@ def record_plan(
     simulated: bool = False,
     resume: bool = False,
     stop: StopRequest | None = None,
-    listener: Listener | None = None,
+    requests: Requests | None = None,
+    watchers: Iterable[Watcher] = (),
 ) -> RunResult:
     """Run a plan into `folder`, from the main thread; signals stop it.
 
@@ -38,7 +42,7 @@ def record_plan(
         Whether the devices are; simulated and real frames are never mixed.
     resume:
         Go on with what `folder` has.
-    stop, listener:
+    stop, requests, watchers:
         See `Sequencer`.
 
     Raises
@@ -58,7 +62,8 @@ def record_plan(
             progress=progress,
             started_s=devices.clock.now() - elapsed_s,
             stop=stop,
-            listener=listener,
+            requests=requests,
+            watchers=watchers,
         )
         try:
             return sequencer.run()

@@ -3,13 +3,13 @@
 ::
 
     IDLE ─→ CONNECTING ─→ MOVING ─→ SETTLING ─→ FOCUSING ─→ GRABBING ─┬─→ MOVING (next view;
-               │            │          │           │           │      │    the frame just taken is
-               │            │          │           │           │      │    checked and logged
-               │            │          │           │           │      │    meanwhile)
-               │            │          │           │           │      └─→ CHECKING (the last one)
-               └────────────┴──────────┴───────────┴───────────┴────────────┬──┘
-                                  anything unexpected                       │ no view left
-                                         ↓                                  ↓
+               │           │  ↑│       │           │           │      │    the frame just taken is
+               │           │  │↓       │           │           │      │    checked and logged
+               │           │ PAUSED    │           │           │      │    meanwhile)
+               │           │  │        │           │           │      └─→ CHECKING (the last one)
+               └───────────┴──┴────────┴───────────┴───────────┴────────────┬──┘
+                                  anything unexpected                       │ no view left, or
+                                         ↓                                  ↓ enough of them
                               STOPPING (the arm first) ──────────────→ FINISHED
 """
 
@@ -37,6 +37,7 @@ class State(Enum):
     IDLE = "idle"
     CONNECTING = "connecting"
     MOVING = "moving"
+    PAUSED = "paused"
     SETTLING = "settling"
     FOCUSING = "focusing"
     GRABBING = "grabbing"
@@ -88,8 +89,8 @@ class Status:
     ----------
     state:
         What the run is doing.
-    view:
-        The view it does it for, as words; empty before the first.
+    view, index:
+        The view it does it for, as words (empty before the first), and its number in the plan.
     done, skipped, total:
         Views with a logged frame, views given up, views of the plan.
     left_s:
@@ -105,6 +106,7 @@ class Status:
     total: int
     left_s: float | None = None
     event: str | None = None
+    index: int | None = None
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,8 @@ class RunResult:
         Why it ended.
     reason:
         In words for the operator; empty when it is completed.
+    ended_early:
+        Why a completed run did not need all views of its plan; empty where it took them.
     frames:
         Number of frames in the recording.
     skipped:
@@ -130,3 +134,4 @@ class RunResult:
     frames: int
     skipped: dict[int, str]
     detections: dict[int, Detection] = field(default_factory=dict)
+    ended_early: str = ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -39,6 +40,8 @@ class WatchedArm:
         The arm, what it may do, and the clock its `host_t_s` counts on.
     stop_request:
         Looked at in every wait.
+    on_reading:
+        Told of every reading; must not raise or block.
     connected:
         Whether `connect` succeeded: from then on every fault stops the arm.
     """
@@ -47,6 +50,7 @@ class WatchedArm:
     guard: Guard
     clock: Clock
     stop_request: StopRequest
+    on_reading: Callable[[ArmState], None] = lambda state: None
     connected: bool = field(default=False, init=False)
 
     def connect(self) -> FloatArray:
@@ -68,6 +72,7 @@ class WatchedArm:
         if self.stop_request.asked:
             raise StoppedByOperator(f"stopped by {self.stop_request.reason}")
         state = self.arm.state()
+        self.on_reading(state)
         if state.motion is Motion.STOPPED_BY_FAULT:
             raise ArmStopped(state.fault or "the arm stopped by itself and does not say why")
         return state

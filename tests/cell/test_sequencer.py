@@ -5,7 +5,8 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,11 @@ from cell.sequencer.checks import Verdict
 from cell.sequencer.clock import HostClock
 from cell.sequencer.journal import Journal, read_journal
 from cell.sequencer.progress import Progress
+from cell.sequencer.requests import Requests
 from cell.sequencer.sequencer import Devices, Sequencer
 from cell.sequencer.states import Finish, RunResult, State, Status
 from cell.sequencer.stop import StopRequest, signals_ask
+from cell.sequencer.watcher import Checked, Watcher
 from drivers.arm import ArmState
 from drivers.camera import Frame
 from drivers.errors import DeviceUnreachable, FrameLost, StopFailed
@@ -29,6 +32,20 @@ from tests.cell.fakes import FakeArm, FakeCamera, FastClock
 from tests.cell.plans import CELL, PLAN
 
 NO_BOARD = "checks: {board: false}\n"
+
+
+class Listener(Watcher):
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.statuses: list[Status] = []
+        self.frames: list[Checked] = []
+
+    def told(self, status: Status) -> None:
+        self.statuses.append(status)
+
+    def checked(self, checked: Checked) -> None:
+        self.frames.append(checked)
 
 
 class Bench:
@@ -43,7 +60,8 @@ class Bench:
         self.camera = FakeCamera(self.clock.now)
         self.plan: Plan = read_plan(folder / "plan.yaml")
         self.stop = StopRequest()
-        self.told: list[Status] = []
+        self.requests = Requests()
+        self.watchers: list[Watcher] = [Listener()]
 
     def run(self, progress: Progress | None = None) -> RunResult:
         header = {"schema": "cell.recording/1", "board": self.plan.cell.board.model_dump()}
@@ -58,9 +76,16 @@ class Bench:
                 Journal(self.folder),
                 progress=progress,
                 stop=self.stop,
-                listener=self.told.append,
+                requests=self.requests,
+                watchers=self.watchers,
             )
             return sequencer.run()
+
+    @property
+    def told(self) -> list[Status]:
+        (listener,) = self.watchers
+        assert isinstance(listener, Listener)
+        return listener.statuses
 
     def events(self) -> list[str]:
         return [event["event"] for event in read_journal(self.folder)]
@@ -191,14 +216,100 @@ def test_a_failing_stop_is_the_loudest_error(
 
 
 def test_a_terminal_that_is_gone_does_not_end_the_run(bench: Bench) -> None:
-    class Gone(list[Status]):
-        def append(self, status: Status) -> None:
+    class Gone(Watcher):
+        def told(self, status: Status) -> None:
             raise BrokenPipeError
 
-    bench.told = Gone()
+    bench.watchers = [Gone()]
     assert bench.run().finish is Finish.COMPLETED
     assert "listener failed" in bench.events()
     assert "stop" not in bench.arm.calls
+
+
+@pytest.mark.parametrize("call", ["told", "read", "checked"])
+def test_a_watcher_that_fails_is_dropped_and_the_others_go_on(bench: Bench, call: str) -> None:
+    def fail(seen: object) -> None:
+        raise ZeroDivisionError("a bug of the page")
+
+    failing, other = Watcher(), Listener()
+    setattr(failing, call, fail)
+    bench.watchers = [failing, other]
+    assert bench.run().finish is Finish.COMPLETED
+    assert len(other.frames) == 4
+    assert other.statuses[-1].state is State.FINISHED
+    assert bench.events().count("listener failed") == 1
+    assert "stop" not in bench.arm.calls
+
+
+def test_watchers_see_each_frame_with_its_line_in_the_recording(bench: Bench) -> None:
+    bench.run()
+    (listener,) = bench.watchers
+    assert isinstance(listener, Listener)
+    logged = read_recording(bench.folder).frames
+    assert [frame.record for frame in listener.frames] == list(logged)
+
+
+class WhenAt(Watcher):
+    """Does something when the run comes to a state of a view."""
+
+    def __init__(self, state: State, index: int, act: Callable[[], None]) -> None:
+        self.when, self.act = (state, index), act
+
+    def told(self, status: Status) -> None:
+        if (status.state, status.index) == self.when:
+            self.act()
+
+
+def test_a_pause_waits_at_the_end_of_the_move_with_the_arm_watched(bench: Bench) -> None:
+    readings: list[bool] = []
+
+    def paused() -> None:
+        readings.append(bench.arm.moving)
+        threading.Timer(0.05, bench.requests.go_on).start()
+
+    bench.watchers = [
+        WhenAt(State.MOVING, 1, bench.requests.pause),
+        WhenAt(State.PAUSED, 1, paused),
+        Listener(),
+    ]
+    assert bench.run().finish is Finish.COMPLETED
+    assert readings[0] is False
+    events = bench.events()
+    assert events.index("pause") < events.index("go on")
+    assert bench.arm.calls.count("move") == 4
+    assert "stop" not in bench.arm.calls
+
+
+def test_a_stop_is_heard_in_a_pause(bench: Bench) -> None:
+    bench.requests.pause()
+    bench.watchers = [WhenAt(State.PAUSED, 0, lambda: bench.stop.ask("the Stop button"))]
+    result = bench.run()
+    assert result.finish is Finish.STOPPED_BY_OPERATOR
+    assert "stop" in bench.arm.calls
+    assert "move" not in bench.arm.calls
+
+
+def test_an_arm_that_faults_in_a_pause_ends_the_run(bench: Bench) -> None:
+    bench.requests.pause()
+    fault = partial(setattr, bench.arm, "fault", "protective stop")
+    bench.watchers = [WhenAt(State.PAUSED, 0, fault)]
+    assert bench.run().finish is Finish.DEVICE_FAILED
+
+
+@pytest.mark.parametrize("state", [State.MOVING, State.SETTLING, State.FOCUSING, State.GRABBING])
+def test_a_view_is_given_up_when_the_operator_asks(bench: Bench, state: State) -> None:
+    bench.watchers = [WhenAt(state, 1, lambda: bench.requests.skip(1))]
+    result = bench.run()
+    assert result.finish is Finish.COMPLETED_WITH_LOSSES
+    assert result.skipped == {1: "given up by the operator"}
+    assert [frame.frame for frame in read_recording(bench.folder).frames] == [0, 2, 3]
+    assert bench.events().count("skip") == 1
+
+
+def test_giving_up_a_view_that_is_taken_gives_up_nothing(bench: Bench) -> None:
+    bench.watchers = [WhenAt(State.SETTLING, 2, lambda: bench.requests.skip(1))]
+    result = bench.run()
+    assert (result.finish, result.skipped) == (Finish.COMPLETED, {})
 
 
 def test_no_stop_is_ordered_from_an_arm_that_was_never_reached(bench: Bench) -> None:
