@@ -15,8 +15,8 @@ import numpy as np
 from calib.calibration.made_views import views_that_see
 from calib.chain.effects import make_effect
 from calib.chain.rigid import compose
-from calib.discovery.design.information import pose_information
 from calib.solver.joint import JointFit
+from calib.solver.pose_information import pose_information
 from calib.solver.unknowns import Unknown
 from calib.views import FloatArray, Views
 

@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from calib.chain.effect import Present
-from calib.chain.model import CellModel, kinematics_of
+from calib.chain.model import kinematics_of
 from calib.solver.elimination import solve_scaled
 from calib.solver.joint import JointFit, assemble
 from calib.solver.noise import JointEquations, scaled
 from calib.solver.unknowns import (
     Dependence,
     Unknown,
+    amount_unknowns,
     dependence,
     prior_information,
-    unknowns_of,
 )
 from calib.solver.unknowns import amounts as amounts_of
 from calib.views import FloatArray, Views
@@ -90,17 +90,6 @@ def group_score(information: FloatArray, score: FloatArray, views: Views, price:
         return Score(0.0, 0, 1.0, step)
     freedom = max(pose_numbers(views) - columns - 14, 4)
     return Score(gain, columns, float(f_distribution.sf(gain / columns, columns, freedom)), step)
-
-
-def amount_unknowns(model: CellModel, base: tuple[Unknown, ...]) -> tuple[Unknown, ...]:
-    """The amounts of a model's effects that are not among `base`."""
-    known = {u.place for u in base}
-    return tuple(
-        u
-        for u in unknowns_of(model, (), poses=False)
-        if u.place not in known
-        and model.effects[u.place[1]].effect.parameters[u.place[2]].role == "amount"
-    )
 
 
 def extended(

@@ -69,6 +69,17 @@ def unknowns_of(
     return tuple(free)
 
 
+def amount_unknowns(model: CellModel, base: tuple[Unknown, ...]) -> tuple[Unknown, ...]:
+    """The amounts of a model's effects that are not among `base`."""
+    known = {u.place for u in base}
+    return tuple(
+        u
+        for u in unknowns_of(model, (), poses=False)
+        if u.place not in known
+        and model.effects[u.place[1]].effect.parameters[u.place[2]].role == "amount"
+    )
+
+
 def moved(model: CellModel, unknowns: tuple[Unknown, ...], step: FloatArray) -> CellModel:
     """The cell after adding (p,) `step` to its free numbers; transforms move on their own side."""
     optics = model.optics.copy()

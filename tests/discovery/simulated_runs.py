@@ -14,8 +14,8 @@ from calib.chain.kinematics import arm
 from calib.chain.model import CellModel
 from calib.chain.optics import optics_row
 from calib.chain.rigid import compose, inverse
-from calib.discovery.design.information import shown
 from calib.solver.noise import Noise
+from calib.solver.pose_information import shown
 from calib.views import Board, FloatArray, Views
 from cell.recording import Recording
 from cell.recording.header import Header, board_file

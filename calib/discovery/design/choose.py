@@ -13,8 +13,8 @@ import numpy as np
 
 from calib.chain.effect import Effect, Present
 from calib.chain.model import CellModel
-from calib.discovery.design.information import PoseInformation, pose_information
 from calib.solver.noise import Noise
+from calib.solver.pose_information import PoseInformation, pose_information
 from calib.views import FloatArray, Views
 
 _DRAWS = 200

@@ -21,8 +21,8 @@ from calib.chain.effects import catalogue
 from calib.chain.model import CellModel
 from calib.discovery.ambiguity import experiment
 from calib.discovery.candidates import unseen
-from calib.discovery.design.information import PoseInformation, pose_information, project_out
 from calib.solver.noise import Noise
+from calib.solver.pose_information import PoseInformation, pose_information, project_out
 from calib.views import FloatArray, Views
 
 FALSE_ALARM = 0.05

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from calib.chain.effect import Present
 from calib.chain.model import CellModel, kinematics_of, predict
-from calib.discovery.score import amount_unknowns
 from calib.solver.accumulate import local_equations
 from calib.solver.elimination import solve_scaled
 from calib.solver.noise import Noise
-from calib.solver.unknowns import Unknown, dependence, unknowns_of
+from calib.solver.unknowns import Unknown, amount_unknowns, dependence, unknowns_of
 from calib.views import FloatArray, Views
 
 _BATCH = 64
