@@ -71,8 +71,8 @@ class Effect:
         Changes the walk, given the parameters' values in their order.
     needs:
         Columns of `Views` that must have been logged.
-    varies:
-        False where the effect cannot be told from the plain chain unless the frames moved.
+    looks_ahead:
+        Asks where camera and board stand before the arm has moved.
     moving_only:
         Nothing shows it unless something moved while the frames were captured.
     seen_without_robot:
@@ -95,6 +95,7 @@ class Effect:
     remedy: str
     law: str | None = None
     needs: tuple[str, ...] = ()
+    looks_ahead: bool = False
     moving_only: bool = False
     seen_without_robot: bool = False
     confounded_with: tuple[str, ...] = ()

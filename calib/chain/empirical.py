@@ -246,6 +246,7 @@ def empirical(curve: Curve, functions: int) -> Effect:
         name="empirical",
         law=f"{site.name}/{curve.covariate.name}",
         link=site.acts_in,
+        looks_ahead=site.acts_in == "arm",
         physics=(
             f"Something that no known effect accounts for moves the {site.name.replace('_', ' ')}"
             f" with the {curve.covariate.name.replace('_', ' ')}."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -69,11 +70,90 @@ def start(model: CellModel, views: Views, kinematics: ArmKinematics | None) -> W
     )
 
 
-def _act(walk: Walk, model: CellModel, links: tuple[Link, ...]) -> None:
-    for link in links:
-        for present in model.effects:
-            if present.effect.link == link and not present.absent:
-                present.effect.act(present.values, walk)
+Stop = int | Literal["arm", "place"]
+"""A place on the walk's way: an effect by its index, or what the chain itself does there."""
+
+
+def route(model: CellModel) -> tuple[Stop, ...]:
+    """The stops of a walk in their order: effects by link, the arm after its own, then the pose."""
+
+    def of(links: tuple[Link, ...]) -> list[int]:
+        return [
+            at for link in links for at, p in enumerate(model.effects) if p.effect.link == link
+        ]
+
+    return (*of(LINKS[:2]), "arm", *of(LINKS[2:4]), "place", *of(LINKS[4:]))
+
+
+def _call_at(walk: Walk, stop: Stop, model: CellModel, flange_error: FloatArray | None) -> None:
+    if stop == "place":
+        walk.place()
+    elif stop == "arm":
+        walk.move_arm()
+        if flange_error is not None:
+            error = rigid.from_vector(flange_error)
+            walk.base_from_flange = rigid.product(walk.base_from_flange, error)
+    else:
+        present = model.effects[stop]
+        if not present.absent:
+            present.effect.act(present.values, walk)
+
+
+class Journey:
+    """A walk that can be taken again from any of its stops, with some constants changed.
+
+    Before a stop nothing depends on what enters there: the arm need not be worked out anew for
+    every number of the lens.
+
+    Attributes
+    ----------
+    state:
+        The walk at its end.
+    placed:
+        The stop from which on the pose in the camera stays.
+    """
+
+    def __init__(
+        self,
+        model: CellModel,
+        views: Views,
+        *,
+        kinematics: ArmKinematics | None = None,
+        flange_error: FloatArray | None = None,
+    ) -> None:
+        self.state = start(model, views, kinematics or kinematics_of(views))
+        self._route = route(model)
+        self._flange_error = flange_error
+        self._before: list[Walk] = []
+        for stop in self._route:
+            self._before.append(self.state.copy())
+            _call_at(self.state, stop, model, flange_error)
+        self.placed = self._route.index("place") + 1
+        ahead = any(present.effect.looks_ahead for present in model.effects)
+        self._poses = 0 if ahead else self._route.index("arm")
+
+    def entry(self, place: tuple[str, int, int]) -> int:
+        """The stop at which a number, named as in `Unknown.place`, is first looked at."""
+        kind, at, _ = place
+        if kind == "optics":
+            return self.placed
+        return self._route.index(at) if kind == "effect" else self._poses
+
+    def again(self, changed: CellModel, first: int) -> Walk:
+        """The walk of a cell that differs only in what enters at stop `first` or later."""
+        if first == len(self._route):
+            state = self.state.copy()
+        else:
+            state = self._before[first].copy()
+        n = len(state.views)
+        if first <= self._poses:
+            state.flange_from_mounted = np.repeat(changed.flange_from_mounted[None], n, axis=0)
+            state.base_from_fixed = np.repeat(changed.base_from_fixed[None], n, axis=0)
+        if first <= self.placed:
+            state.optics = np.repeat(changed.optics[None], n, axis=0)
+        for stop in self._route[first:]:
+            _call_at(state, stop, changed, self._flange_error)
+        return state
 
 
 def walk(
@@ -100,13 +180,8 @@ def walk(
     The walk with `optics`, `camera_from_board` and `points_m` as the sensor sees them.
     """
     state = start(model, views, kinematics or kinematics_of(views))
-    _act(state, model, LINKS[:2])
-    state.move_arm()
-    if flange_error is not None:
-        state.base_from_flange = state.base_from_flange @ rigid.from_vector(flange_error)
-    _act(state, model, LINKS[2:4])
-    state.place()
-    _act(state, model, LINKS[4:])
+    for stop in route(model):
+        _call_at(state, stop, model, flange_error)
     return state
 
 

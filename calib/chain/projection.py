@@ -59,42 +59,35 @@ def _axial_shift(o, x, y, z, out, derive):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _tilt_matrix(tx, ty, m):  # type: ignore[no-untyped-def]
-    """OpenCV's tilted-sensor homography, row by row into the nine entries of `m`."""
-    cx, sx, cy, sy = math.cos(tx), math.sin(tx), math.cos(ty), math.sin(ty)
-    r00, r01, r02 = cy, sy * sx, -sy * cx
-    r10, r11, r12 = 0.0, cx, sx
-    r20, r21, r22 = sy, -cy * sx, cy * cx
-    m[0] = r22 * r00 - r02 * r20
-    m[1] = r22 * r01 - r02 * r21
-    m[2] = r22 * r02 - r02 * r22
-    m[3] = r22 * r10 - r12 * r20
-    m[4] = r22 * r11 - r12 * r21
-    m[5] = r22 * r12 - r12 * r22
-    m[6] = r20
-    m[7] = r21
-    m[8] = r22
+def _tilt_of(o, tilt):  # type: ignore[no-untyped-def]
+    """Cosines and sines of a frame's sensor tilt into `tilt[0:4]`."""
+    tilt[0], tilt[1] = math.cos(o[17]), math.sin(o[17])
+    tilt[2], tilt[3] = math.cos(o[18]), math.sin(o[18])
 
 
 @njit(cache=True, error_model="numpy")
-def _tilted(o, xd, yd, m, j):  # type: ignore[no-untyped-def]
-    """Point on the tilted sensor; its 2x2 derivative by (xd, yd) into `j[0:4]`."""
-    _tilt_matrix(o[17], o[18], m)
-    w = m[6] * xd + m[7] * yd + m[8]
-    a = (m[0] * xd + m[1] * yd + m[2]) / w
-    b = (m[3] * xd + m[4] * yd + m[5]) / w
-    j[0] = (m[0] - a * m[6]) / w
-    j[1] = (m[1] - a * m[7]) / w
-    j[2] = (m[3] - b * m[6]) / w
-    j[3] = (m[4] - b * m[7]) / w
+def _tilted(tilt, xd, yd, j):  # type: ignore[no-untyped-def]
+    """Point on the tilted sensor; its 2x2 derivative by (xd, yd) into `j[0:4]`.
+
+    OpenCV's tilted-sensor homography, multiplied out.
+    """
+    cx, sx, cy, sy = tilt[0], tilt[1], tilt[2], tilt[3]
+    w = sy * xd - cy * sx * yd + cy * cx
+    a = cx * xd / w
+    b = (cy * yd - sx * sy * xd) / w
+    j[0] = (cx - a * sy) / w
+    j[1] = a * cy * sx / w
+    j[2] = -(sx * sy + b * sy) / w
+    j[3] = (cy + b * cy * sx) / w
     return a, b
 
 
 # One straight run of assignments: split, numba would pass every intermediate through arrays.
 @njit(cache=True, error_model="numpy")
-def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  # type: ignore[no-untyped-def]  # noqa: PLR0915
+def _corner(o, tilt, pose, px, py, pz, uv, j_pose, j_optics, shift, jt, derive):  # type: ignore[no-untyped-def]  # noqa: PLR0915
     """One corner: pixel into `uv`; Jacobians by `derive` into (2, 6) and (2, K) arrays.
 
+    `tilt` is the frame's, from `_tilt_of`.
     A rolling shutter and the rare columns' derivatives are seen to only with `EVERYTHING`.
     """
     x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
@@ -115,7 +108,7 @@ def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  #
     xt, yt = xd, yd
     jt[0], jt[1], jt[2], jt[3] = 1.0, 0.0, 0.0, 1.0
     if tilted:
-        xt, yt = _tilted(o, xd, yd, m, jt)
+        xt, yt = _tilted(tilt, xd, yd, jt)
     uv[0] = o[0] * xt + o[2] * yt + o[3]
     uv[1] = o[1] * yt + o[4]
     if derive == NOTHING:
@@ -180,7 +173,7 @@ def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  #
         j_optics[1, column] = vx * dx + vy * dy
     if derive != EVERYTHING:
         return
-    _tilt_derivative(o, xd, yd, m, jt, j_optics)
+    _tilt_derivative(o, tilt, xd, yd, xt, yt, j_optics)
     j_optics[0, 19] = us * shift[3]
     j_optics[1, 19] = vs * shift[3]
     j_optics[0, 20] = us * shift[4]
@@ -189,19 +182,19 @@ def _corner(o, pose, px, py, pz, uv, j_pose, j_optics, shift, m, jt, derive):  #
 
 
 @njit(cache=True, error_model="numpy")
-def _tilt_derivative(o, xd, yd, m, jt, j_optics):  # type: ignore[no-untyped-def]
-    step = 1e-6
-    for axis in (17, 18):
-        keep = o[axis]
-        o[axis] = keep + step
-        xp, yp = _tilted(o, xd, yd, m, jt)
-        o[axis] = keep - step
-        xm, ym = _tilted(o, xd, yd, m, jt)
-        o[axis] = keep
-        dx = (xp - xm) / (2.0 * step)
-        dy = (yp - ym) / (2.0 * step)
-        j_optics[0, axis] = o[0] * dx + o[2] * dy
-        j_optics[1, axis] = o[1] * dy
+def _tilt_derivative(o, tilt, xd, yd, xt, yt, j_optics):  # type: ignore[no-untyped-def]
+    cx, sx, cy, sy = tilt[0], tilt[1], tilt[2], tilt[3]
+    w = sy * xd - cy * sx * yd + cy * cx
+    by_x = -(cy * cx * yd + cy * sx)
+    dx = -(sx * xd + xt * by_x) / w
+    dy = -(cx * sy * xd + yt * by_x) / w
+    j_optics[0, 17] = o[0] * dx + o[2] * dy
+    j_optics[1, 17] = o[1] * dy
+    by_y = cy * xd + sy * sx * yd - sy * cx
+    dx = -xt * by_y / w
+    dy = -(sy * yd + sx * cy * xd + yt * by_y) / w
+    j_optics[0, 18] = o[0] * dx + o[2] * dy
+    j_optics[1, 18] = o[1] * dy
 
 
 @njit(cache=True, error_model="numpy")
@@ -228,16 +221,17 @@ def _has_rare(o):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True, error_model="numpy")
 def _project_all(optics, poses, points, uv, j_pose, j_optics, derive):  # type: ignore[no-untyped-def]
     shift = np.zeros(5)
-    m = np.zeros(9)
+    tilt = np.zeros(4)
     jt = np.zeros(4)
     jp = np.zeros((2, 6))
     jo = np.zeros((2, K))
     for i in range(poses.shape[0]):
-        o = optics[i].copy()
+        o = optics[i]
+        _tilt_of(o, tilt)
         need = EVERYTHING if derive or _has_rare(o) else NOTHING
         for j in range(points.shape[0]):
             p = points[j]
-            _corner(o, poses[i], p[0], p[1], p[2], uv[i, j], jp, jo, shift, m, jt, need)
+            _corner(o, tilt, poses[i], p[0], p[1], p[2], uv[i, j], jp, jo, shift, jt, need)
             if derive:
                 j_pose[i, j] = jp
                 j_optics[i, j] = jo

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,6 +19,8 @@ DOWN_IN_BASE = np.array([0.0, 0.0, -1.0])
 @dataclass
 class Walk:
     """What the links have said so far about N frames.
+
+    An effect may write into `optics`, `points_m` and `dh_offset`; every other array it replaces.
 
     Attributes
     ----------
@@ -36,7 +39,9 @@ class Walk:
     points_m:
         (M, 3) the board's corners as they are.
     optics:
-        (N, K) the lens and the sensor in each frame.
+        (N, K) the lens and the sensor in each frame; nobody looks at it before the lens's turn.
+    logged:
+        What follows from the log and the arm alone, kept by `once`.
     """
 
     views: Views
@@ -49,6 +54,22 @@ class Walk:
     optics: FloatArray
     dh_offset: FloatArray | None = None
     camera_from_board: FloatArray = field(default_factory=lambda: np.empty((0, 4, 4)))
+    logged: dict[str, FloatArray] = field(default_factory=dict)
+
+    def copy(self) -> Walk:
+        """A walk that goes on by itself from here."""
+        return replace(
+            self,
+            optics=self.optics.copy(),
+            points_m=self.points_m.copy(),
+            dh_offset=None if self.dh_offset is None else self.dh_offset.copy(),
+        )
+
+    def once(self, name: str, work: Callable[[], FloatArray]) -> FloatArray:
+        """Work out what follows from the log and the arm alone, once for all copies."""
+        if name not in self.logged:
+            self.logged[name] = work()
+        return self.logged[name]
 
     @property
     def in_hand(self) -> bool:
@@ -63,7 +84,7 @@ class Walk:
     def base_from_camera(self) -> FloatArray:
         """(N, 4, 4), valid from the mount link on."""
         if self.in_hand:
-            return self.base_from_flange @ self.flange_from_mounted
+            return rigid.product(self.base_from_flange, self.flange_from_mounted)
         return self.base_from_fixed
 
     @property
@@ -71,7 +92,7 @@ class Walk:
         """(N, 4, 4), valid from the board link on."""
         if self.in_hand:
             return self.base_from_fixed
-        return self.base_from_flange @ self.flange_from_mounted
+        return rigid.product(self.base_from_flange, self.flange_from_mounted)
 
     def gravity_in_camera(self) -> FloatArray:
         """(N, 3) unit vectors of gravity as the camera feels it."""
@@ -99,17 +120,19 @@ class Walk:
         """
         logged = self.views.joints_rad
         unmoved = self.joints_rad is logged or np.array_equal(self.joints_rad, logged)
-        if self.arm is None or (self.dh_offset is None and unmoved):
+        arm = self.arm
+        if arm is None or (self.dh_offset is None and unmoved):
             return
-        nominal = self.arm.forward(logged)
-        true = self.arm.forward(self.joints_rad, self.dh_offset)
-        moved = self.base_from_flange @ rigid.inverse(nominal) @ true
+        back = self.once("nominal_from_base", lambda: rigid.inverse(arm.forward(logged)))
+        true = arm.forward(self.joints_rad, self.dh_offset)
+        moved = rigid.product(self.base_from_flange, rigid.product(back, true))
         known = np.isfinite(moved).all(axis=(1, 2), keepdims=True)
         self.base_from_flange = np.where(known, moved, self.base_from_flange)
 
     def place(self) -> None:
         """Work out where the camera sees the board."""
-        self.camera_from_board = rigid.inverse(self.base_from_camera) @ self.base_from_board
+        camera_from_base = rigid.inverse(self.base_from_camera)
+        self.camera_from_board = rigid.product(camera_from_base, self.base_from_board)
 
     def board_sweep(self, duration_s: float) -> FloatArray:
         """(N, 6) increment by which the board moves in the camera's frame during `duration_s`."""

@@ -9,7 +9,7 @@ import numpy as np
 from calib.chain import rigid
 from calib.chain.effect import Effect, Present
 from calib.chain.kinematics import ArmKinematics
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, Journey
 from calib.chain.optics import COLUMN
 from calib.chain.walk import Walk
 from calib.views import FloatArray, Views
@@ -164,32 +164,51 @@ def dependence(
     flange_error: FloatArray | None,
 ) -> Dependence:
     """Differentiate the walk by every free number (central differences, one walk a side)."""
-
-    def run(cell: CellModel) -> Walk:
-        return walk(cell, views, kinematics=kinematics, flange_error=flange_error)
-
-    state = run(model)
+    journey = Journey(model, views, kinematics=kinematics, flange_error=flange_error)
+    columns = [_column(journey, model, unknown) for unknown in unknowns]
     n, p = len(views), len(unknowns)
-    d_optics = np.zeros((n, state.optics.shape[1], p))
-    d_pose = np.zeros((n, 6, p))
-    d_points = np.zeros((p, *state.points_m.shape))
-    back = rigid.inverse(state.camera_from_board)
-    for k, unknown in enumerate(unknowns):
-        step = np.array([unknown.typical * _STEP_SHARE])
-        plus, minus = run(moved(model, (unknown,), step)), run(moved(model, (unknown,), -step))
-        width = 2.0 * step[0]
-        d_optics[:, :, k] = (plus.optics - minus.optics) / width
-        d_points[k] = (plus.points_m - minus.points_m) / width
-        ahead = rigid.to_vector(plus.camera_from_board @ back)
-        behind = rigid.to_vector(minus.camera_from_board @ back)
-        d_pose[:, :, k] = (ahead - behind) / width
-    active = tuple(
-        int(c) for c in np.flatnonzero(np.abs(d_optics).max(axis=(0, 2), initial=0.0) > 0.0)
+    followed = np.zeros(len(model.optics), dtype=bool)
+    for column in columns:
+        if column.optics is not None:
+            followed |= (column.optics != 0.0).any(axis=0)
+    active = np.flatnonzero(followed)
+    moving = [k for k, c in enumerate(columns) if c.points is not None and c.points.any()]
+    a = len(active)
+    local = np.zeros((n, a + 6 + len(moving), p))
+    for k, column in enumerate(columns):
+        if column.optics is not None:
+            local[:, :a, k] = column.optics[:, active]
+        if column.pose is not None:
+            local[:, a : a + 6, k] = column.pose
+    for b, k in enumerate(moving):
+        local[:, a + 6 + b, k] = 1.0
+    state = journey.state
+    modes = np.array([columns[k].points for k in moving]).reshape(-1, *state.points_m.shape)
+    return Dependence(state, tuple(int(c) for c in active), modes, local, flange_to_pose(state))
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Derivatives (N, K), (N, 6) and (M, 3) by one number; None where nothing follows it."""
+
+    optics: FloatArray | None
+    pose: FloatArray | None
+    points: FloatArray | None
+
+
+def _column(journey: Journey, model: CellModel, unknown: Unknown) -> _Column:
+    first = journey.entry(unknown.place)
+    step = np.array([unknown.typical * _STEP_SHARE])
+    plus = journey.again(moved(model, (unknown,), step), first)
+    minus = journey.again(moved(model, (unknown,), -step), first)
+    scale = 0.5 / step[0]
+    optics = (plus.optics - minus.optics) * scale
+    if first >= journey.placed:
+        return _Column(optics, None, None)
+    rate = (plus.camera_from_board - minus.camera_from_board) * scale
+    back = rigid.inverse(journey.state.camera_from_board)
+    return _Column(
+        optics if optics.any() else None,
+        rigid.twist(rigid.product(rate, back)),
+        (plus.points_m - minus.points_m) * scale,
     )
-    moving = np.flatnonzero(np.abs(d_points).max(axis=(1, 2), initial=0.0) > 0.0)
-    local = np.zeros((n, len(active) + 6 + len(moving), p))
-    local[:, : len(active)] = d_optics[:, active]
-    local[:, len(active) : len(active) + 6] = d_pose
-    for b, column in enumerate(moving):
-        local[:, len(active) + 6 + b, column] = 1.0
-    return Dependence(state, active, d_points[moving], local, flange_to_pose(state))

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from calib.chain import rigid
-from calib.chain.effects import make_effect
+from calib.chain.effect import Effect, Present
+from calib.chain.effects import catalogue, make_effect
 from calib.chain.kinematics import arm
-from calib.chain.model import CellModel, predict
+from calib.chain.model import CellModel, Journey, predict, walk
 from calib.chain.optics import COLUMN, OPTICS
 from calib.chain.projection import project_with_jacobians
 from calib.solver.unknowns import Dependence, dependence, moved, unknowns_of
@@ -170,3 +171,40 @@ def test_a_step_moves_what_it_names_and_stays_within_bounds() -> None:
     assert np.allclose(increment, [0, 0.01, 0, 0, 0, 0])
     assert np.array_equal(after.flange_from_mounted, model.flange_from_mounted)
     assert after.effects[0].as_mapping()["p1"] == 0.05
+
+
+def _everything() -> list[Present]:
+    """Every effect at its usual size, and two curves, one of which looks ahead."""
+    _, views = cell(frames=10)
+    effects = [
+        Present(e, e.values({**_typical(e), **e.candidates(views)[0]})) for e in catalogue()
+    ]
+    curve = {"low": 0.3, "high": 0.8, "c0_joint_2": 2e-4, "c4_joint_2": 1e-4}
+    flex = {"c0_x_m": 1e-4, "c2_rz_rad": 2e-4}
+    return [
+        *effects,
+        make_effect("empirical", {"law": "joint_2/distance", **curve}),
+        make_effect("empirical", {"law": "mounted_pose/gravity", **flex}),
+    ]
+
+
+def _typical(effect: Effect) -> dict[str, float]:
+    return {p.name: 0.3 * p.typical for p in effect.parameters if p.role == "amount"}
+
+
+@pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
+def test_a_walk_taken_up_again_ends_where_a_whole_one_does(mount: Mount) -> None:
+    model, views = cell(mount, frames=10)
+    model = model.with_effects(_everything())
+    error = np.full((10, 6), 1e-4)
+    journey = Journey(model, views, flange_error=error)
+    for unknown in unknowns_of(model, FREE):
+        changed = moved(model, (unknown,), np.array([unknown.typical]))
+        again = journey.again(changed, journey.entry(unknown.place))
+        whole = walk(changed, views, flange_error=error)
+        assert np.array_equal(again.optics, whole.optics), unknown.name
+        assert np.array_equal(again.camera_from_board, whole.camera_from_board), unknown.name
+        assert np.array_equal(again.points_m, whole.points_m), unknown.name
+    untouched = walk(model, views, flange_error=error)
+    assert np.array_equal(journey.state.optics, untouched.optics)
+    assert np.array_equal(journey.state.points_m, untouched.points_m)

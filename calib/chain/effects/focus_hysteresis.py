@@ -15,10 +15,12 @@ def _came_from_m(walk: Walk) -> FloatArray:
     order = np.argsort(walk.views.frame, kind="stable")
     before = np.empty(len(order))
     before[order] = np.concatenate([walk.focused_m[order][:1], walk.focused_m[order][:-1]])
-    if walk.arm is None or not walk.in_hand:
+    arm, views = walk.arm, walk.views
+    if arm is None or not walk.in_hand:
         return before
-    flange = walk.arm.forward(walk.views.approach_joints_rad)
-    camera_from_board = rigid.inverse(flange @ walk.flange_from_mounted) @ walk.base_from_fixed
+    flange = walk.once("approach_flange", lambda: arm.forward(views.approach_joints_rad))
+    camera = rigid.product(flange, walk.flange_from_mounted)
+    camera_from_board = rigid.product(rigid.inverse(camera), walk.base_from_fixed)
     centre = walk.points_m.mean(axis=0)
     approach = camera_from_board[:, 2, :3] @ centre + camera_from_board[:, 2, 3]
     return np.where(np.isfinite(approach), approach, before)

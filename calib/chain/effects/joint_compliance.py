@@ -8,12 +8,14 @@ from calib.views import FloatArray
 
 
 def _act(values: FloatArray, walk: Walk) -> None:
-    if walk.arm is None:
+    arm, views = walk.arm, walk.views
+    if arm is None:
         return
-    payload_kg = walk.views.payload_kg or 0.0
-    walk.joints_rad = walk.joints_rad - values * walk.arm.gravity_torques(
-        walk.views.joints_rad, payload_kg
+    torques_Nm = walk.once(
+        "gravity_torques_Nm",
+        lambda: arm.gravity_torques(views.joints_rad, views.payload_kg or 0.0),
     )
+    walk.joints_rad = walk.joints_rad - values * torques_Nm
 
 
 EFFECT = Effect(

@@ -64,11 +64,7 @@ class ArmKinematics:
         FloatArray
             (..., 4, 4) base_from_flange.
         """
-        links = chain.link_transforms(np.asarray(joints_rad, float), self._rows(dh_offset))
-        pose = links[..., 0, :, :]
-        for i in range(1, 6):
-            pose = pose @ links[..., i, :, :]
-        return pose
+        return chain.tips(np.asarray(joints_rad, float), self._rows(dh_offset))
 
     def frames(self, joints_rad: FloatArray, dh_offset: FloatArray | None = None) -> FloatArray:
         """Poses (..., 7, 4, 4) in the base of the base frame and the six link frames."""

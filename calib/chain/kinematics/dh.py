@@ -2,9 +2,52 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 
 from calib.views import FloatArray
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _tips(joints, rows, out):  # type: ignore[no-untyped-def]
+    """Turn and shift the columns of each pose, link by link; `rows` has one entry or one each."""
+    links = joints.shape[1]
+    twist = np.empty((2, links))
+    for n in range(joints.shape[0]):
+        dh = rows[n if rows.shape[0] > 1 else 0]
+        pose = out[n]
+        pose[:, :] = 0.0
+        for i in range(4):
+            pose[i, i] = 1.0
+        for k in range(links):
+            theta = joints[n, k] + dh[k, 0]
+            if n == 0 or rows.shape[0] > 1:
+                twist[0, k], twist[1, k] = math.cos(dh[k, 3]), math.sin(dh[k, 3])
+            ct, st, ca, sa = math.cos(theta), math.sin(theta), twist[0, k], twist[1, k]
+            for i in range(3):
+                x, y, z = pose[i, 0], pose[i, 1], pose[i, 2]
+                along = ct * x + st * y
+                across = ct * y - st * x
+                pose[i, 0] = along
+                pose[i, 1] = ca * across + sa * z
+                pose[i, 2] = ca * z - sa * across
+                pose[i, 3] += dh[k, 1] * z + dh[k, 2] * along
+
+
+def tips(joints_rad: FloatArray, dh: FloatArray) -> FloatArray:
+    """Pose (..., 4, 4) of the last link's frame in the base; arguments as `link_transforms`."""
+    shape = np.broadcast_shapes(joints_rad.shape[:-1], dh.shape[:-2])
+    joints = np.broadcast_to(joints_rad, (*shape, joints_rad.shape[-1]))
+    rows = dh if dh.ndim == 2 else np.broadcast_to(dh, (*shape, *dh.shape[-2:]))
+    out = np.empty((*shape, 4, 4))
+    _tips(
+        np.ascontiguousarray(joints, dtype=np.float64).reshape(-1, joints.shape[-1]),
+        np.ascontiguousarray(rows, dtype=np.float64).reshape(-1, *dh.shape[-2:]),
+        out.reshape(-1, 4, 4),
+    )
+    return out
 
 
 def link_transforms(joints_rad: FloatArray, dh: FloatArray) -> FloatArray:
