@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,12 @@ from cell.factory import peer_devices, real_devices, simulated_devices
 from cell.files.plan_file import Plan, read_plan
 from cell.recording import Corners, Recording, read_recording, write_corners
 from cell.recording.corners import FILE_NAME as DETECTIONS
+from cell.running_estimate.early_end import EarlyEnd
+from cell.running_estimate.process import RunningEstimate
 from cell.sequencer.sequencer import Devices
 from cell.sequencer.session import record_plan
 from cell.sequencer.states import Finish, RunResult
+from cell.sequencer.watcher import Watcher
 from cell.simulated import home_of, simulated_cell
 
 
@@ -44,9 +47,21 @@ def record(
     """
     plan = read_plan(plan_path)
     say(f"{_devices_are(dry_run, peers)}; plan {plan_path}; recording {folder}")
-    with _devices(plan, dry_run, peers) as devices, run_progress(simulated=dry_run) as terminal:
+    goal = None if plan.file.until is None else EarlyEnd(plan.file.until)
+    with ExitStack() as stack:
+        devices = stack.enter_context(_devices(plan, dry_run, peers))
+        watchers: list[Watcher] = [stack.enter_context(run_progress(simulated=dry_run))]
+        if goal is not None:
+            estimate = RunningEstimate(plan, folder if resume else None, goal)
+            watchers.append(stack.enter_context(estimate))
         return record_plan(
-            plan, folder, devices, simulated=dry_run, resume=resume, watchers=(terminal,)
+            plan,
+            folder,
+            devices,
+            simulated=dry_run,
+            resume=resume,
+            watchers=watchers,
+            goal=goal,
         )
 
 
@@ -92,10 +107,13 @@ class Outcome:
             "reason": result.reason or None,
             "recording": str(folder),
             "frames": result.frames,
+            "ended_early": result.ended_early or None,
             "skipped": [{"view": view, "reason": why} for view, why in result.skipped.items()],
         }
         lost = f", {len(result.skipped)} views skipped" if result.skipped else ""
         text = f"{result.finish.words}: {result.frames} frames{lost} in {folder}"
+        if result.ended_early:
+            text = f"{text}\nended early: {result.ended_early}"
         complete = result.finish in (Finish.COMPLETED, Finish.COMPLETED_WITH_LOSSES)
         return cls(folder, complete, text, mapping)
 

@@ -99,19 +99,19 @@ def _distance_range_m(views: Views, solution: Solution) -> tuple[float, float]:
     return float(np.nanmin(depth)), float(np.nanmax(depth))
 
 
-def _robot(views: Views, baseline: Baseline, missing: dict[str, str]) -> RobotFit | None:
+def robot_after(views: Views, baseline: Baseline) -> RobotFit:
+    """The robot's side, begun from a baseline; raises `CalibrationError` as `fit_robot` does."""
     first = baseline.mle.optics[np.flatnonzero(baseline.used)[0]]
     residual = baseline.mle.residual_px
     sigma_px = max(float(np.nanmedian(np.abs(residual))) / 0.6745, 1e-4)
+    return fit_robot(
+        views, baseline.used, baseline.weight, first, baseline.mle.camera_from_board, sigma_px
+    )
+
+
+def _robot(views: Views, baseline: Baseline, missing: dict[str, str]) -> RobotFit | None:
     try:
-        return fit_robot(
-            views,
-            baseline.used,
-            baseline.weight,
-            first,
-            baseline.mle.camera_from_board,
-            sigma_px,
-        )
+        return robot_after(views, baseline)
     except CalibrationError as error:
         missing |= dict.fromkeys(_ROBOT_RESULTS, str(error))
         return None

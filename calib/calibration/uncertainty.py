@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from calib.calibration.made_views import views_that_see
 from calib.chain import rigid
-from calib.chain.model import predict, walk
+from calib.chain.model import CellModel, predict, walk
 from calib.chain.projection import project_with_jacobians
 from calib.solver.joint import JointFit
 from calib.solver.unknowns import moved
@@ -130,24 +130,24 @@ def workpiece_sigma_m(
 
 def _part(joint: JointFit, views: Views, distance_m: float) -> tuple[Board, float]:
     """Nine points on a square part, and its side."""
-    alpha = float(_optics(joint, views, distance_m)[0])
+    alpha = float(optics_at(joint.model, views, distance_m)[0])
     extent = float(np.ptp(views.board.corners_m[:, :2], axis=0).mean())
     side = min(extent, _PART_OF_IMAGE * min(views.width_px, views.height_px) * distance_m / alpha)
     return Board("chessboard", 3, 3, side / 2), side
 
 
-def _optics(joint: JointFit, views: Views, distance_m: float) -> FloatArray:
-    """(K,) of the camera focused at a distance."""
+def optics_at(model: CellModel, views: Views, distance_m: float) -> FloatArray:
+    """(K,) of the camera focused at a distance; of the views only size, board, mount count."""
     ahead = rigid.compose(np.zeros((1, 3)), np.array([[0.0, 0.0, distance_m]]))
-    shown = views_that_see(joint.model, views, views.board, ahead, distance_m)
-    return np.asarray(walk(joint.model, shown).optics[0])
+    shown = views_that_see(model, views, views.board, ahead, distance_m)
+    return np.asarray(walk(model, shown).optics[0])
 
 
 def _shown(
     joint: JointFit, views: Views, part: Board, pixels_px: FloatArray, distance_m: float
 ) -> Views:
     """Views of the part, one with its middle at each pixel."""
-    optics, eye = _optics(joint, views, distance_m)[None], np.eye(4)[None]
+    optics, eye = optics_at(joint.model, views, distance_m)[None], np.eye(4)[None]
     points = np.column_stack([np.zeros_like(pixels_px), np.full(len(pixels_px), distance_m)])
     for _ in range(20):
         uv, by_pose, _ = project_with_jacobians(optics, eye, points)

@@ -120,6 +120,15 @@ class Retry(Part):
     """So many views skipped before the first good frame end the run."""
 
 
+class Until(Part):
+    """When the run may end before it has taken all its views."""
+
+    alpha_sigma_px: Positive
+    """Goal: one sigma of the scale factor alpha, at every distance that the plan has, pixels."""
+    min_views: int = Field(default=12, ge=6)
+    """No end before so many frames take part."""
+
+
 class PlanFile(Part):
     """The whole of a plan file."""
 
@@ -136,7 +145,15 @@ class PlanFile(Part):
     exposure: Exposure = Exposure()
     checks: Checks = Checks()
     retry: Retry = Retry()
+    until: Until | None = None
+    """End early when the camera is known well enough; all views are taken where this is absent."""
     views: tuple[View, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _corners_for_until(self) -> Self:
+        if self.until is not None and not self.checks.board:
+            raise ValueError("until needs the board's corners: take checks.board: false away")
+        return self
 
     def as_mapping(self) -> dict[str, Any]:
         """Plain dicts and lists, keys as in the file, defaults left out."""
@@ -165,8 +182,14 @@ class Plan:
 
     @property
     def sha256(self) -> str:
-        """Fingerprint of plan and cell: what a resumed run must have in common."""
-        content = [self.file.model_dump(mode="json"), self.cell.model_dump(mode="json")]
+        """Fingerprint of plan and cell: what a resumed run must have in common.
+
+        When the run may end early is not: the frames are the same ones.
+        """
+        content = [
+            self.file.model_dump(mode="json", exclude={"until"}),
+            self.cell.model_dump(mode="json"),
+        ]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def view_name(self, index: int) -> str:

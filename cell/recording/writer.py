@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cell.errors import InputError
+from cell.files.writing import yaml_text
 from cell.recording import frames as frame_file
 from cell.recording import header as header_file
 from cell.recording.frames import FrameRecord, read_frames
@@ -97,6 +98,21 @@ class RecordingWriter:
             os.fsync(file.fileno())
         _sync_folder((self.folder / name).parent)
         return name.as_posix()
+
+    def say(self, **values: Any) -> None:
+        """Put further keys into `recording.yaml`, None to take one away; it is replaced whole."""
+        extra = self.header.model_extra or {}
+        kept = {k: v for k, v in {**extra, **values}.items() if v is not None}
+        if kept == extra:
+            return
+        told = self.header.as_mapping()
+        told = {k: v for k, v in told.items() if k not in extra} | kept
+        self.header = Header.model_validate(told)
+        partial = self.folder / f"{header_file.FILE_NAME}.part"
+        partial.write_text(yaml_text(told), encoding="utf-8")
+        _sync_file(partial)
+        partial.replace(self.folder / header_file.FILE_NAME)
+        _sync_folder(self.folder)
 
     def close(self) -> None:
         """Let go of the files. Idempotent."""

@@ -20,6 +20,7 @@ from cell.files.plan_file import Plan
 from cell.recording import RecordingWriter
 from cell.sequencer.checks import Verdict, check_frame
 from cell.sequencer.clock import Clock, HostClock
+from cell.sequencer.goal import Goal
 from cell.sequencer.guard import Guard
 from cell.sequencer.journal import Journal
 from cell.sequencer.progress import Progress, TimeLeft
@@ -66,6 +67,8 @@ class Sequencer:
         Asked to stop, to pause, to give a view up by others.
     watchers:
         Who is told what happens.
+    goal:
+        What may end the run before it has taken all views; nothing does where not given.
     """
 
     def __init__(
@@ -80,6 +83,7 @@ class Sequencer:
         stop: StopRequest | None = None,
         requests: Requests | None = None,
         watchers: Iterable[Watcher] = (),
+        goal: Goal | None = None,
     ) -> None:
         self._plan = plan
         self._camera, self._clock = devices.camera, devices.clock
@@ -96,6 +100,7 @@ class Sequencer:
         self._progress = progress or Progress(deque(range(len(plan.file.views))))
         self._started_s = self._clock.now() if started_s is None else started_s
         self._worker = Worker()
+        self._goal, self._ended_early = goal, ""
         self._state = State.IDLE
         self._index: int | None = None
         self._checking: tuple[Shot, Future[Verdict]] | None = None
@@ -120,13 +125,18 @@ class Sequencer:
         self._let_go()
         finish = finish_of(error, len(self._progress.skipped))
         reason = str(error or "") or (type(error).__name__ if error else "")
-        self._journal.write("stop", finish=finish.name.lower(), reason=reason)
+        self._journal.write("stop", finish=finish.name.lower(), reason=reason or self._ended_early)
         self._tell(State.FINISHED)
         if error is not None and exit_status_of(error) is None:
             raise error
         progress = self._progress
         return RunResult(
-            finish, reason, len(progress.done), dict(progress.skipped), dict(progress.detections)
+            finish,
+            reason,
+            len(progress.done),
+            dict(progress.skipped),
+            dict(progress.detections),
+            "" if error else self._ended_early,
         )
 
     # -- one view after the other ------------------------------------------------------------
@@ -151,9 +161,11 @@ class Sequencer:
 
     def _take_views(self) -> None:
         progress = self._progress
-        self._come_from_the_view_before()
+        self._look_back()
+        if not self._is_enough():
+            self._come_from_the_view_before()
         while progress.todo or self._checking:
-            if not progress.todo:
+            if self._is_enough() or not progress.todo:
                 self._tell(State.CHECKING)
                 self._finish_check()
                 continue
@@ -163,6 +175,22 @@ class Sequencer:
             shot = self._shoot(index, came_from)
             if shot is not None:
                 self._checking = shot, self._worker.do(partial(self._check_and_log, shot))
+
+    def _look_back(self) -> None:
+        """A run gone on with may have enough already: wait for the goal before any move."""
+        if self._goal is not None and self._progress.done:
+            self._tell(State.CHECKING, "looking whether the frames recorded before are enough")
+            self._arm.await_job(self._goal.caught_up())
+
+    def _is_enough(self) -> bool:
+        """Whether the goal is reached; the views that are left are then dropped."""
+        todo, reason = self._progress.todo, self._goal.reached() if self._goal else ""
+        if reason and todo:
+            self._ended_early = reason
+            self._journal.write("enough", reason=reason, left=len(todo))
+            todo.clear()
+            self._tell(self._state, f"ending early: {reason}")
+        return bool(reason)
 
     def _come_from_the_view_before(self) -> None:
         """A resumed run comes to its first view from where an unbroken one would have."""

@@ -12,6 +12,7 @@ from typing import Any
 from cell.files.plan_file import Plan
 from cell.recording import FrameRecord, Header, RecordingWriter
 from cell.recording.corners import FILE_NAME as DETECTIONS
+from cell.sequencer.goal import Goal
 from cell.sequencer.journal import Journal, check_same_plan, skipped_views
 from cell.sequencer.progress import Progress
 from cell.sequencer.requests import Requests
@@ -31,6 +32,7 @@ def record_plan(
     stop: StopRequest | None = None,
     requests: Requests | None = None,
     watchers: Iterable[Watcher] = (),
+    goal: Goal | None = None,
 ) -> RunResult:
     """Run a plan into `folder`, from the main thread; signals stop it.
 
@@ -42,7 +44,7 @@ def record_plan(
         Whether the devices are; simulated and real frames are never mixed.
     resume:
         Go on with what `folder` has.
-    stop, requests, watchers:
+    stop, requests, watchers, goal:
         See `Sequencer`.
 
     Raises
@@ -64,9 +66,12 @@ def record_plan(
             stop=stop,
             requests=requests,
             watchers=watchers,
+            goal=goal,
         )
         try:
-            return sequencer.run()
+            result = sequencer.run()
+            writer.say(ended_early=result.ended_early or None)
+            return result
         finally:
             journal.close()
 

@@ -1,0 +1,1 @@
+"""What the frames so far are worth, while the run goes on, and whether they are enough."""

@@ -1,0 +1,165 @@
+"""The estimate in a process of its own: a fit of seconds must not keep the loop from the arm."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import queue
+import signal
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from types import TracebackType
+
+from calib.views import FloatArray
+from cell.calibrate import detect_corners
+from cell.errors import InputError
+from cell.files.plan_file import Plan
+from cell.recording import FrameRecord, read_recording
+from cell.running_estimate.early_end import EarlyEnd
+from cell.running_estimate.estimate import FEWEST_FRAMES, Estimate, Estimator
+from cell.sequencer.watcher import Checked, Watcher
+
+_END_S = 1.0
+_LESS_URGENT = 10
+_BEFORE_THE_LAST = 2
+"""Frames left out of the first of the two estimates of a run that is gone on with."""
+
+
+@dataclass(frozen=True)
+class _CaughtUp:
+    """Sent once the frames recorded before are estimated."""
+
+
+_Found = tuple[FrameRecord, FloatArray, FloatArray]
+
+
+class RunningEstimate(Watcher):
+    """Estimates while a run goes on; use it as a context manager.
+
+    Parameters
+    ----------
+    plan:
+        The run's plan.
+    recorded:
+        Folder of a recording that is gone on with, or None.
+    goal:
+        Heeds every estimate, where the plan may end early.
+
+    Attributes
+    ----------
+    latest:
+        The newest estimate, or None.
+    failure:
+        Why there will be no more, in words; empty while there may be.
+    """
+
+    def __init__(self, plan: Plan, recorded: Path | None, goal: EarlyEnd | None) -> None:
+        self.latest: Estimate | None = None
+        self.failure = ""
+        self._goal = goal
+        self._heard: list[Callable[[Estimate], None]] = [] if goal is None else [goal.heed]
+        self._frames: queue.SimpleQueue[_Found | None] = queue.SimpleQueue()
+        context = multiprocessing.get_context("spawn")
+        self._link, self._there = context.Pipe()
+        self._process = context.Process(
+            target=_serve, args=(self._there, plan, recorded), name="estimate", daemon=True
+        )
+        self._threads = [
+            threading.Thread(target=work, name="estimate", daemon=True)
+            for work in (self._send, self._receive)
+        ]
+
+    def on_estimate(self, heard: Callable[[Estimate], None]) -> None:
+        """Tell `heard` of every estimate too, from a thread of its own."""
+        self._heard.append(heard)
+
+    def checked(self, checked: Checked) -> None:
+        """A good frame goes to the estimate."""
+        found = checked.verdict.detection
+        if checked.record is not None and found is not None:
+            self._frames.put((checked.record, found.corners_px, found.sigma_px))
+
+    def __enter__(self) -> RunningEstimate:
+        self._process.start()
+        self._there.close()
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._frames.put(None)
+        self._process.terminate()
+        self._process.join(_END_S)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        for thread in self._threads:
+            thread.join(_END_S)
+        self._link.close()
+
+    def _send(self) -> None:
+        try:
+            while (found := self._frames.get()) is not None:
+                self._link.send(found)
+        except OSError:
+            return  # the process is gone, which the other thread tells
+
+    def _receive(self) -> None:
+        try:
+            while True:
+                told = self._link.recv()
+                if isinstance(told, Estimate):
+                    self.latest = told
+                    for heard in self._heard:
+                        heard(told)
+                elif self._goal is not None:
+                    self._goal.catch_up()
+        except (EOFError, OSError):
+            self.failure = "the estimate's process has ended"
+        finally:
+            if self._goal is not None:
+                self._goal.catch_up()
+
+
+def _serve(link: Connection, plan: Plan, recorded: Path | None) -> None:
+    """In the process: estimate whenever there is something new, until the other end is gone."""
+    # Ctrl-C and a closed terminal reach the whole group; the run decides when this ends
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    os.nice(_LESS_URGENT)
+    estimator = Estimator(plan)
+    try:
+        if recorded is not None:
+            _look_back(link, estimator, recorded)
+        link.send(_CaughtUp())
+        while True:
+            estimator.add(*link.recv())
+            while link.poll():
+                estimator.add(*link.recv())
+            if len(estimator) >= FEWEST_FRAMES:
+                link.send(estimator.estimate())
+    except (EOFError, OSError):
+        return
+
+
+def _look_back(link: Connection, estimator: Estimator, recorded: Path) -> None:
+    """Find the board in the pictures of before; two estimates, as a run would have made."""
+    try:
+        recording = read_recording(recorded)
+    except InputError:
+        return  # nothing was recorded yet
+    corners = detect_corners(recording)
+    for frame in recording.frames:
+        if frame.frame in corners.px:
+            estimator.add(frame, corners.px[frame.frame], corners.sigma_px[frame.frame])
+    for left_out in (_BEFORE_THE_LAST, 0):
+        if len(estimator) - left_out >= FEWEST_FRAMES:
+            link.send(estimator.estimate(len(estimator) - left_out))
