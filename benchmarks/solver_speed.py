@@ -4,17 +4,17 @@
 
 Camera 4096 x 3072, alpha 4750 px, k1 k2 p1 p2, 14 x 14 corners, noise 0.1 px, 0.35 to 1 m, tilts 0
 to 45 degrees. CPU seconds are user and system time of all threads, the least of the repeats, after
-one small fit that loads what is compiled. OpenCV finds its own start; ours and mrcal are timed from
-the same one, Zhang's closed form, whose own time is told in its own line.
-mrcal is asked through /usr/bin/python3 (Debian's python3-mrcal) and left out where it is missing.
-Every fit runs in a process of its own, whose greatest memory is told.
+one small fit that loads what is compiled. Ours and OpenCV find their own start; mrcal is given
+ours, whose time is told by itself.
+mrcal is asked in `.mrcal` (see `tools/install-mrcal`) and left out where it is missing.
+Every fit runs in a process of its own. Memory is that process's greatest resident set, and what it
+held before it had any data; ours and OpenCV's load the same modules.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -33,8 +33,8 @@ from calib.chain.kinematics import arm
 from calib.chain.model import CellModel
 from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
-from calib.paper.homography import fit_homography
-from calib.paper.zhang import zhang_algebraic
+from calib.paper.homography import robust_homography
+from calib.paper.zhang import zhang_pinhole
 from calib.solver.free_poses import fit_free_poses
 from calib.solver.joint import assemble
 from calib.solver.unknowns import amounts, dependence, prior_information, unknowns_of
@@ -56,6 +56,7 @@ TRUE = optics_row(
 )
 FIT_GOAL_S = {200: 0.06, 1000: 0.32}
 JOINT_GOAL_S = 0.14
+MRCAL = Path(__file__).parents[1] / ".mrcal" / "bin" / "python"
 MIDDLE_RAD = np.array([0.3, -1.5, 1.6, -1.7, -1.5, 0.4])
 EFFECTS: dict[str, dict[str, float | str]] = {
     "link_geometry": {},
@@ -97,9 +98,9 @@ def observed(frames: int) -> tuple[FloatArray, FloatArray]:
 def start(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Zhang's closed form: (K,) optics and (N, 4, 4) poses."""
     flat = BOARD.corners_m[:, :2]
-    homographies = np.array([fit_homography(flat, c).matrix for c in corners])
-    row, poses = zhang_algebraic(homographies, BOARD.corners_m, corners, WIDTH, HEIGHT)
-    row[[COLUMN["skew_px"], COLUMN["k1"], COLUMN["k2"]]] = 0.0
+    homographies = np.array([robust_homography(flat, c) for c in corners])
+    row, poses = zhang_pinhole(homographies, WIDTH, HEIGHT)
+    row[COLUMN["skew_px"]] = 0.0
     return row, poses
 
 
@@ -165,36 +166,53 @@ def normal_equations(model: CellModel, views: Views) -> FloatArray:
     return equations.frames.shared
 
 
-def measured(work: Callable[[], FloatArray], repeats: int) -> dict[str, Any]:
-    """Median CPU seconds, and the greatest memory so far."""
+def peak_mb() -> float:
+    """Greatest resident set of this process so far."""
+    # getrusage would count what the parent held when it forked
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    return int(status.split("VmHWM:")[1].split()[0]) / 1024
+
+
+def measured(work: Callable[[], FloatArray], repeats: int, before_mb: float) -> dict[str, Any]:
+    """Least CPU seconds, and the greatest memory."""
     times = []
     for _ in range(repeats):
         began = time.process_time()
         result = work()
         times.append(time.process_time() - began)
-    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return {"seconds": min(times), "peak_mb": peak_mb, "result": result.tolist()}
+    return {
+        "seconds": min(times),
+        "before_mb": before_mb,
+        "peak_mb": peak_mb(),
+        "result": result.tolist(),
+    }
 
 
 def child(what: str, frames: int, repeats: int) -> dict[str, Any]:
     """What one process measures."""
     if what == "joint":
         normal_equations(*joint_cell(5))
+        before_mb = peak_mb()
         cell = joint_cell(frames)
-        return measured(lambda: normal_equations(*cell), repeats)
-    few, corners = observed(10)[0], observed(frames)[0]
+        return measured(lambda: normal_equations(*cell), repeats, before_mb)
+    few = observed(10)[0]
     if what == "opencv":
         opencv(few)
-        return measured(lambda: opencv(corners), repeats)
+        before_mb = peak_mb()
+        corners = observed(frames)[0]
+        return measured(lambda: opencv(corners), repeats, before_mb)
     fitted(few, *start(few))
+    before_mb = peak_mb()
+    corners = observed(frames)[0]
     if what == "start":
-        return measured(lambda: start(corners)[0], 1)
-    begin = start(corners)
-    return measured(lambda: fitted(corners, *begin), repeats)
+        return measured(lambda: start(corners)[0], repeats, before_mb)
+    return measured(lambda: fitted(corners, *start(corners)), repeats, before_mb)
 
 
 def mrcal(frames: int, repeats: int) -> dict[str, Any] | None:
-    """mrcal's own measurement in its own interpreter, from our start."""
+    """mrcal's own measurement in its own interpreter, from our start; None without it."""
+    if not MRCAL.exists():
+        return None
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "data.npz"
         corners, _ = observed(frames)
@@ -209,7 +227,7 @@ def mrcal(frames: int, repeats: int) -> dict[str, Any] | None:
             size=[WIDTH, HEIGHT],
         )
         script = Path(__file__).with_name("solver_speed_mrcal.py")
-        return answer(["/usr/bin/python3", str(script), str(data), str(repeats)])
+        return answer([str(MRCAL), str(script), str(data), str(repeats)])
 
 
 def answer(command: list[str]) -> dict[str, Any] | None:
@@ -230,34 +248,50 @@ def main() -> None:
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     me = [sys.executable, __file__, "--child"]
     print(f"load average {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
-    print("| work | solver | CPU s | goal | peak memory MB | largest difference from ours, px |")
+    print("| work | solver | CPU s | goal | peak (before data) MB | off ours, px |")
     print("|---|---|---|---|---|---|")
     for frames, goal in FIT_GOAL_S.items():
         found = {
             who: answer([*me, who, str(frames), str(repeats)])
             for who in ("ours", "start", "opencv")
         } | {"mrcal": mrcal(frames, repeats)}
+        ours = found["ours"]
         for who, one in found.items():
-            if one is None or found["ours"] is None:
+            if one is None or ours is None:
                 continue
-            told = f"{goal}" if who == "ours" else ""
-            gap = ""
-            if who != "start":
-                off = np.subtract(one["result"], found["ours"]["result"])[:4]
-                gap = f"{np.abs(off).max():.4f}"
-            print(
-                f"| {frames} x {BOARD.corner_count} | {who} | {one['seconds']:.3f} | {told} |"
-                f" {one['peak_mb']:.0f} | {gap} |"
-            )
-    for frames in (1000, 10_000):
-        one = answer([*me, "joint", str(frames), "3"])
-        if one is not None:
-            shared = len(one["result"])
-            goal_told = f"{JOINT_GOAL_S}" if frames == 1000 else ""
-            print(
-                f"| {frames} x {BOARD.corner_count}, normal equations, {shared} shared | ours |"
-                f" {one['seconds']:.3f} | {goal_told} | {one['peak_mb']:.0f} | |"
-            )
+            gap = "" if who in ("ours", "start") else f"{farthest(one, ours):.4f}"
+            line(f"{frames} x {BOARD.corner_count}", NAMES[who], one, goal, gap)
+    for frames in (3000, 10_000):
+        one = answer([*me, "ours", str(frames), "2"])
+        line(f"{frames} x {BOARD.corner_count}", NAMES["ours"], one)
+    for frames in (1000, 3000, 10_000):
+        one = answer([*me, "joint", str(frames), str(repeats if frames == 1000 else 2)])
+        work = f"{frames} x {BOARD.corner_count}, joint normal equations"
+        line(work, "ours", one, JOINT_GOAL_S if frames == 1000 else None)
+
+
+NAMES = {
+    "ours": "ours, with its start",
+    "start": "our start alone",
+    "opencv": "OpenCV, with its start",
+    "mrcal": "mrcal, from our start",
+}
+
+
+def farthest(one: dict[str, Any], ours: dict[str, Any]) -> float:
+    """Largest difference of alpha, beta, u0 and v0."""
+    return float(np.abs(np.subtract(one["result"], ours["result"])[:4]).max())
+
+
+def line(
+    work: str, who: str, one: dict[str, Any] | None, goal: float | None = None, gap: str = ""
+) -> None:
+    """One row of the table."""
+    if one is None:
+        return
+    told = f"{goal}" if goal is not None and who.startswith("ours") else ""
+    memory = f"{one['peak_mb']:.0f} ({one['before_mb']:.0f})"
+    print(f"| {work} | {who} | {one['seconds']:.3f} | {told} | {memory} | {gap} |", flush=True)
 
 
 if __name__ == "__main__":

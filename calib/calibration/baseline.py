@@ -12,7 +12,7 @@ from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
 from calib.errors import CalibrationError
 from calib.paper.extrinsics import board_poses
-from calib.paper.zhang import centred_camera_matrix, zhang_algebraic
+from calib.paper.zhang import centred_camera_matrix, zhang_algebraic, zhang_pinhole
 from calib.solver.free_poses import FreePoseFit, fit_free_poses
 from calib.solver.unknowns import PLAIN_OPTICS
 from calib.views import BoolArray, FloatArray, Views
@@ -93,16 +93,9 @@ def _start(views: Views, usable: Usable, missing: dict[str, str]) -> tuple[Float
     poses = np.full((len(views), 4, 4), np.nan)
     homographies = usable.homographies[usable.used]
     try:
-        row, poses[usable.used] = zhang_algebraic(
-            homographies,
-            views.board.corners_m,
-            views.corners_px[usable.used],
-            views.width_px,
-            views.height_px,
-        )
+        row, poses[usable.used] = zhang_pinhole(homographies, views.width_px, views.height_px)
         if _plausible(row, views):
             row[COLUMN["skew_px"]] = 0.0
-            row[[COLUMN["k1"], COLUMN["k2"]]] = 0.0
             return row, poses
     except CalibrationError as error:
         missing["zhang_algebraic"] = str(error)

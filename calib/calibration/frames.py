@@ -8,7 +8,7 @@ import numpy as np
 
 from calib.calibration.result import Rejection
 from calib.errors import CalibrationError
-from calib.paper.homography import fit_homography
+from calib.paper.homography import robust_homography
 from calib.views import BoolArray, FloatArray, Views
 
 CORNERS_NEEDED = 8
@@ -33,6 +33,7 @@ def usable_frames(views: Views) -> Usable:
         Fewer than three frames are left.
     """
     homographies = np.full((len(views), 3, 3), np.nan)
+    flat = views.board.corners_m[:, :2]
     rejected = []
     for i, frame in enumerate(views.frame):
         seen = int(views.seen[i].sum())
@@ -41,11 +42,9 @@ def usable_frames(views: Views) -> Usable:
             rejected.append(Rejection(int(frame), reason))
             continue
         try:
-            fit = fit_homography(views.board.corners_m[:, :2], views.corners_px[i])
+            homographies[i] = robust_homography(flat, views.corners_px[i])
         except CalibrationError as error:
             rejected.append(Rejection(int(frame), str(error)))
-            continue
-        homographies[i] = fit.matrix
     used: BoolArray = np.asarray(np.isfinite(homographies).all(axis=(1, 2)))
     require_frames(int(used.sum()), len(views))
     return Usable(homographies, used, tuple(rejected))

@@ -78,9 +78,7 @@ def route(model: CellModel) -> tuple[Stop, ...]:
     """The stops of a walk in their order: effects by link, the arm after its own, then the pose."""
 
     def of(links: tuple[Link, ...]) -> list[int]:
-        return [
-            at for link in links for at, p in enumerate(model.effects) if p.effect.link == link
-        ]
+        return [at for link in links for at, p in enumerate(model.effects) if p.effect.link == link]
 
     return (*of(LINKS[:2]), "arm", *of(LINKS[2:4]), "place", *of(LINKS[4:]))
 
@@ -128,6 +126,7 @@ class Journey:
         for stop in self._route:
             self._before.append(self.state.copy())
             _call_at(self.state, stop, model, flange_error)
+        self._before.append(self.state)
         self.placed = self._route.index("place") + 1
         ahead = any(present.effect.looks_ahead for present in model.effects)
         self._poses = 0 if ahead else self._route.index("arm")
@@ -141,10 +140,7 @@ class Journey:
 
     def again(self, changed: CellModel, first: int) -> Walk:
         """The walk of a cell that differs only in what enters at stop `first` or later."""
-        if first == len(self._route):
-            state = self.state.copy()
-        else:
-            state = self._before[first].copy()
+        state = self._before[first].copy()
         n = len(state.views)
         if first <= self._poses:
             state.flange_from_mounted = np.repeat(changed.flange_from_mounted[None], n, axis=0)

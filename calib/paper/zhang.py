@@ -66,7 +66,7 @@ def zhang_camera_matrix(
     rows = np.concatenate([_v(H, 0, 1), _v(H, 0, 0) - _v(H, 1, 1)])
     if not skew:
         rows = np.vstack([rows, [0, len(rows), 0, 0, 0, 0]])
-    _, singular, vt = np.linalg.svd(rows)
+    _, singular, vt = np.linalg.svd(rows, full_matrices=False)
     if singular[4] < 1e-7 * singular[0]:
         raise CalibrationError("the views share one orientation and fix no camera: tilt the board")
     return np.asarray(np.linalg.inv(shrink) @ _unpack(vt[5]))
@@ -153,8 +153,31 @@ def linear_radial(
     missing = corners_px - A[:, None, :2, 2] - from_centre
     seen = np.isfinite(corners_px).all(axis=2)
     design = np.stack([from_centre * r2[..., None], from_centre * (r2**2)[..., None]], axis=-1)
-    k1, k2 = np.linalg.lstsq(design[seen].reshape(-1, 2), missing[seen].ravel(), rcond=None)[0]
+    rows, right = design[seen].reshape(-1, 2), missing[seen].ravel()
+    k1, k2 = np.linalg.solve(rows.T @ rows, rows.T @ right)
     return float(k1), float(k2)
+
+
+def zhang_pinhole(
+    homographies: FloatArray, width_px: int, height_px: int
+) -> tuple[FloatArray, FloatArray]:
+    """Zhang's closed form without distortion: (K,) optics and (N, 4, 4) camera_from_board.
+
+    Raises
+    ------
+    CalibrationError
+        When the views do not fix the camera.
+    """
+    A = zhang_camera_matrix(homographies, width_px, height_px)
+    row = optics_row(
+        alpha_px=A[0, 0],
+        beta_px=A[1, 1],
+        skew_px=A[0, 1],
+        u0_px=A[0, 2],
+        v0_px=A[1, 2],
+        height_px=height_px,
+    )
+    return row, board_poses(homographies, A)
 
 
 def zhang_algebraic(
@@ -182,16 +205,7 @@ def zhang_algebraic(
     CalibrationError
         When the views do not fix the camera.
     """
-    A = zhang_camera_matrix(homographies, width_px, height_px)
-    row = optics_row(
-        alpha_px=A[0, 0],
-        beta_px=A[1, 1],
-        skew_px=A[0, 1],
-        u0_px=A[0, 2],
-        v0_px=A[1, 2],
-        height_px=height_px,
-    )
-    poses = board_poses(homographies, A)
+    row, poses = zhang_pinhole(homographies, width_px, height_px)
     row[COLUMN["k1"]], row[COLUMN["k2"]] = linear_radial(
         np.tile(row, (len(poses), 1)), poses, points_m, corners_px
     )

@@ -20,7 +20,6 @@ from calib.chain.projection import (
 )
 from calib.views import FloatArray
 
-
 BLOCK = 64
 """Corners whose derivatives are gathered before they are multiplied: they stay in the cache."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calib.chain import rigid
 from calib.chain.effect import Effect, Present
@@ -169,15 +170,13 @@ def dependence(
     n, p = len(views), len(unknowns)
     followed = np.zeros(len(model.optics), dtype=bool)
     for column in columns:
-        if column.optics is not None:
-            followed |= (column.optics != 0.0).any(axis=0)
+        followed[column.followed] = True
     active = np.flatnonzero(followed)
     moving = [k for k, c in enumerate(columns) if c.points is not None and c.points.any()]
     a = len(active)
     local = np.zeros((n, a + 6 + len(moving), p))
     for k, column in enumerate(columns):
-        if column.optics is not None:
-            local[:, :a, k] = column.optics[:, active]
+        local[:, np.searchsorted(active, column.followed), k] = column.optics
         if column.pose is not None:
             local[:, a : a + 6, k] = column.pose
     for b, k in enumerate(moving):
@@ -189,9 +188,13 @@ def dependence(
 
 @dataclass(frozen=True)
 class _Column:
-    """Derivatives (N, K), (N, 6) and (M, 3) by one number; None where nothing follows it."""
+    """Derivatives by one number; None where nothing follows it.
 
-    optics: FloatArray | None
+    (N, F) of the F optics columns `followed`, (N, 6) of the pose, (M, 3) of the corners.
+    """
+
+    followed: NDArray[np.int64]
+    optics: FloatArray
     pose: FloatArray | None
     points: FloatArray | None
 
@@ -203,12 +206,15 @@ def _column(journey: Journey, model: CellModel, unknown: Unknown) -> _Column:
     minus = journey.again(moved(model, (unknown,), -step), first)
     scale = 0.5 / step[0]
     optics = (plus.optics - minus.optics) * scale
+    followed = np.flatnonzero(optics.any(axis=0))
+    optics = optics[:, followed]
     if first >= journey.placed:
-        return _Column(optics, None, None)
+        return _Column(followed, optics, None, None)
     rate = (plus.camera_from_board - minus.camera_from_board) * scale
     back = rigid.inverse(journey.state.camera_from_board)
     return _Column(
-        optics if optics.any() else None,
+        followed,
+        optics,
         rigid.twist(rigid.product(rate, back)),
         (plus.points_m - minus.points_m) * scale,
     )

@@ -176,9 +176,7 @@ def test_a_step_moves_what_it_names_and_stays_within_bounds() -> None:
 def _everything() -> list[Present]:
     """Every effect at its usual size, and two curves, one of which looks ahead."""
     _, views = cell(frames=10)
-    effects = [
-        Present(e, e.values({**_typical(e), **e.candidates(views)[0]})) for e in catalogue()
-    ]
+    effects = [Present(e, e.values({**_typical(e), **e.candidates(views)[0]})) for e in catalogue()]
     curve = {"low": 0.3, "high": 0.8, "c0_joint_2": 2e-4, "c4_joint_2": 1e-4}
     flex = {"c0_x_m": 1e-4, "c2_rz_rad": 2e-4}
     return [
