@@ -35,7 +35,8 @@ def turned_order(board: Board, quarters: int) -> IntArray:
     return np.rot90(grid, quarters).reshape(-1)
 
 
-def _possible_turns(board: Board) -> tuple[int, ...]:
+def possible_turns(board: Board) -> tuple[int, ...]:
+    """Quarter turns that the board's colours do not tell apart."""
     if board.kind == "charuco" or (board.rows + board.cols) % 2:
         return (0,)
     return (0, 1, 2, 3) if board.rows == board.cols and board.rows % 2 == 0 else (0, 2)
@@ -168,7 +169,7 @@ def turns_to_agree(
     mount:
         Where the camera sits.
     """
-    turns = _possible_turns(board)
+    turns = possible_turns(board)
     if len(turns) == 1 or len(corners_px) < 2:
         return np.zeros(len(corners_px), dtype=np.int64)
     camera = _rough_rotations(corners_px, board)

@@ -121,7 +121,8 @@ def assemble(
 ) -> tuple[JointEquations, FloatArray]:
     """Normal equations in flange errors and shared numbers; and (N, M, 2) residuals.
 
-    `prior` has where the p shared numbers stand and the inverse variances of their priors.
+    `prior` has how far the p shared numbers are from the centres of their priors, and the inverse
+    variances of these.
     """
     state = found.state
     local = local_equations(
@@ -182,8 +183,9 @@ class _Iteration:
         unknowns: tuple[Unknown, ...],
         arm: ArmKinematics | None,
         weight: FloatArray | None,
+        about: CellModel | None,
     ) -> None:
-        self.views, self.unknowns, self.arm = views, unknowns, arm
+        self.views, self.unknowns, self.arm, self.about = views, unknowns, arm, about
         self.information = prior_information(unknowns)
         self.state = state
         self.with_print = state.noise.print_m > 0.0
@@ -204,7 +206,7 @@ class _Iteration:
 
     def _assemble(self, found: Dependence, at: JointState) -> tuple[JointEquations, FloatArray]:
         shift = _shift_of(at.model, self.views) if self.with_print else None
-        prior = (amounts(at.model, self.unknowns), self.information)
+        prior = (amounts(at.model, self.unknowns, self.about), self.information)
         return assemble(found, self.views, self.weight, at.flange_error, shift, prior)
 
     def cost(self, at: JointState) -> float:
@@ -215,7 +217,8 @@ class _Iteration:
         cost = float(np.sum(self.weight * square)) / at.noise.corner_px**2
         pull = at.flange_error @ at.noise.flange_information
         cost += float(np.sum(pull * at.flange_error))
-        cost += float(np.sum(amounts(at.model, self.unknowns) ** 2 * self.information))
+        amount = amounts(at.model, self.unknowns, self.about)
+        cost += float(np.sum(amount**2 * self.information))
         if self.with_print:
             cost += float(np.sum(_shift_of(at.model, self.views) ** 2)) / at.noise.print_m**2
         return cost
@@ -280,6 +283,7 @@ def fit_joint(
     fixed_noise: bool = False,
     weight: FloatArray | None = None,
     kinematics: ArmKinematics | None = None,
+    about: CellModel | None = None,
 ) -> JointFit:
     """Fit the free numbers of a cell, each flange's error, and the noise levels.
 
@@ -301,6 +305,8 @@ def fit_joint(
     weight:
         (N, M) what each corner counts, kept as it is: likelihoods of models are comparable only
         for the same weights. Estimated robustly where None.
+    about:
+        What the priors of optics and transforms are centred on, for unknowns that have one.
 
     Raises
     ------
@@ -311,7 +317,7 @@ def fit_joint(
         raise ValueError("every frame of a joint fit needs base_from_flange")
     error = np.zeros((len(views), 6)) if flange_error is None else flange_error
     arm = kinematics or kinematics_of(views)
-    run = _Iteration(JointState(model, error, noise), views, unknowns, arm, weight)
+    run = _Iteration(JointState(model, error, noise), views, unknowns, arm, weight, about)
     settled = False
     for attempt in range(rounds):
         settled = False

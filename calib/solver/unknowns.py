@@ -102,18 +102,30 @@ def moved(model: CellModel, unknowns: tuple[Unknown, ...], step: FloatArray) -> 
     return replace(model, optics=optics, effects=tuple(effects), **changed)
 
 
-def amounts(model: CellModel, unknowns: tuple[Unknown, ...]) -> FloatArray:
-    """(p,) present values of the numbers that have a prior; zero for the others."""
-    return np.array(
-        [
-            float(model.effects[u.place[1]].values[u.place[2]]) if u.place[0] == "effect" else 0.0
-            for u in unknowns
-        ]
-    )
+def amounts(
+    model: CellModel, unknowns: tuple[Unknown, ...], about: CellModel | None = None
+) -> FloatArray:
+    """(p,) how far the numbers that have a prior are from its centre; zero for the others.
+
+    Effects' priors are centred on zero. Those of optics and transforms are centred on the cell
+    `about`; without one they have none.
+    """
+    return np.array([_amount(model, unknown, about) for unknown in unknowns])
+
+
+def _amount(model: CellModel, unknown: Unknown, about: CellModel | None) -> float:
+    kind, at, k = unknown.place
+    if kind == "effect":
+        return float(model.effects[at].values[k])
+    if about is None:
+        return 0.0
+    if kind == "optics":
+        return float(model.optics[at] - about.optics[at])
+    return float(rigid.to_vector(rigid.inverse(getattr(about, kind)) @ getattr(model, kind))[at])
 
 
 def prior_information(unknowns: tuple[Unknown, ...]) -> FloatArray:
-    """(p,) inverse variances of the priors, all centred on zero."""
+    """(p,) inverse variances of the priors; zero where there is none."""
     return np.array([u.prior_sigma**-2.0 for u in unknowns])
 
 

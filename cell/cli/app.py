@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import typer
 
+from cell.cli.bootstrap import bootstrap
 from cell.cli.calibrate import calibrate
 from cell.cli.compare import compare
 from cell.cli.diagnose import diagnose
@@ -29,6 +30,7 @@ app = typer.Typer(
 )
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,
+    "bootstrap": bootstrap,
     "plan": plan,
     "simulate": simulate,
     "calibrate": calibrate,

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cell.cli.output import JsonFlag, show
-from cell.errors import InputError
 
 if TYPE_CHECKING:
     from cell.files.plan_file import PlanFile
@@ -59,20 +58,16 @@ def plan(
 def _designed(cell: Path, path: Path, size: PlanSize) -> PlanFile:
     """Design a plan and write it."""
     from cell.files.cell_file import read_cell
-    from cell.files.writing import yaml_text
+    from cell.files.writing import check_new, write_new, yaml_text
     from cell.planning import design_plan
 
-    if path.exists():
-        raise InputError(f"{path}: is there already and is not overwritten; give another -o")
+    check_new(path)
     beside = os.path.relpath(cell.resolve(), path.resolve().parent)
     designed = design_plan(read_cell(cell), size, beside)
     told = f"--parallel {size.parallel} --varied {size.varied} --seed {size.seed}"
     told += " --by-hand" if size.by_hand else ""
     comment = f"Made by `cell plan {cell.name} {told}`."
-    try:
-        path.write_text(yaml_text(designed.as_mapping(), comment=comment), encoding="utf-8")
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be written: {fault.strerror}") from None
+    write_new(path, yaml_text(designed.as_mapping(), comment=comment))
     return designed
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+from cell.errors import InputError
 
 _ONE_LINE = 4
 """Depth of nesting that still fits a line, with all its values being short."""
@@ -30,6 +33,21 @@ def yaml_text(data: Mapping[str, Any], *, comment: str = "") -> str:
     stream.writelines(f"# {line}\n" for line in comment.splitlines())
     yaml.dump(_styled(data), stream)
     return stream.getvalue()
+
+
+def check_new(path: Path) -> None:
+    """Raise `InputError` where a file of that name is there already."""
+    if path.exists():
+        raise InputError(f"{path}: is there already and is not overwritten; give another -o")
+
+
+def write_new(path: Path, text: str) -> None:
+    """Write a file that is not there yet; raises `InputError`."""
+    check_new(path)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be written: {fault.strerror}") from None
 
 
 def _null(representer: Any, value: None) -> Any:

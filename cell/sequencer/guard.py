@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from calib.chain.kinematics import MODELS, ArmKinematics, OutOfReach, UnknownArm, arm
-from calib.views import FloatArray
+from calib.views import Board, FloatArray
 from cell.errors import InputError
 from cell.files.cell_file import CellFile
 from cell.files.parts import Box
@@ -56,10 +56,15 @@ class Guard:
             ) from None
 
     @cached_property
-    def _flange_from_tool(self) -> FloatArray:
-        """(4, 4) flange_from_camera or flange_from_board: the point that reaches out farthest."""
+    def _carried_m(self) -> FloatArray:
+        """(K, 3) in the flange's frame: where the camera is, or the board's outermost corners."""
         layout = self.cell.layout
-        return np.eye(4) if layout is None else layout.mounted.transform().as_matrix()
+        if layout is None:
+            return np.zeros((1, 3))
+        mounted = layout.mounted.transform()
+        if self.cell.mount == "eye_in_hand":
+            return np.asarray(mounted.translation[None])
+        return np.asarray(mounted.apply(outline_m(self.cell.board.board())))
 
     def joints_of(self, plan: Plan, index: int, near_rad: FloatArray) -> FloatArray:
         """(6,) joint angles of a plan's view, by the branch nearest to `near_rad`.
@@ -127,8 +132,10 @@ class Guard:
     def _points_m(self, path_rad: FloatArray) -> FloatArray:
         """(S, P, 3) points of the arm that sweep: elbow to flange, and what it carries."""
         frames = self.kinematics.frames(path_rad)[..., _MOVING_FRAMES, :, :]
-        tool = frames[..., -1:, :, :] @ self._flange_from_tool
-        return np.asarray(np.concatenate([frames, tool], axis=-3)[..., :3, 3])
+        flange = frames[..., -1, :, :]
+        carried = self._carried_m @ np.swapaxes(flange[..., :3, :3], -1, -2)
+        carried = carried + flange[..., None, :3, 3]
+        return np.asarray(np.concatenate([frames[..., :3, 3], carried], axis=-2))
 
     def move_time_s(self, start_rad: FloatArray, end_rad: FloatArray) -> float:
         """Least time of a move at the plan's speeds, without acceleration."""
@@ -153,7 +160,8 @@ class Guard:
     def _joint_speed_rad_s(self, start_rad: FloatArray, end_rad: FloatArray) -> float:
         """Speed of the fastest joint at which no outer point exceeds the limit on the path."""
         path = self.path(start_rad, end_rad)
-        steps = np.diff(self._points_m(path)[:, -2:], axis=0)
+        outer = self._points_m(path)[:, -1 - len(self._carried_m) :]
+        steps = np.diff(outer, axis=0)
         length_m = float(np.linalg.norm(steps, axis=-1).max(initial=0.0)) * (len(path) - 1)
         span = float(np.abs(end_rad - start_rad).max(initial=0.0))
         if length_m < 1e-9:
@@ -188,6 +196,13 @@ class Guard:
             text = "\n".join(str(refusal) for refusal in refused)
             raise SafetyError(text) if unsafe else InputError(text)
         return tuple(joints)
+
+
+def outline_m(board: Board) -> FloatArray:
+    """(4, 3) corners of the board's printed squares, board frame."""
+    corners = board.corners_m
+    low, high = corners.min(axis=0) - board.square_m, corners.max(axis=0) + board.square_m
+    return np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
 
 
 def _inside(points_m: FloatArray, box: Box) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:

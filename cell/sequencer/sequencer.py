@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 from concurrent.futures import Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 
@@ -22,6 +22,7 @@ from cell.sequencer.checks import Verdict, check_frame
 from cell.sequencer.clock import Clock, HostClock
 from cell.sequencer.goal import Goal
 from cell.sequencer.guard import Guard
+from cell.sequencer.guide import Guide
 from cell.sequencer.journal import Journal
 from cell.sequencer.progress import Progress, TimeLeft
 from cell.sequencer.requests import SKIPPED_BY_OPERATOR, Requests
@@ -69,6 +70,8 @@ class Sequencer:
         Who is told what happens.
     goal:
         What may end the run before it has taken all views; nothing does where not given.
+    guide:
+        Adds views to the plan while it runs, and watches too.
     """
 
     def __init__(
@@ -84,14 +87,15 @@ class Sequencer:
         requests: Requests | None = None,
         watchers: Iterable[Watcher] = (),
         goal: Goal | None = None,
+        guide: Guide | None = None,
     ) -> None:
-        self._plan = plan
+        self._plan, self._guide = plan, guide
         self._camera, self._clock = devices.camera, devices.clock
-        self._watchers = Watchers(watchers)
+        self._watchers = Watchers(watchers if guide is None else (guide, *watchers))
         self._requests = Requests() if requests is None else requests
         self._arm = WatchedArm(
             devices.arm,
-            Guard.of(plan),
+            Guard.of(plan) if guide is None else guide.guard,
             devices.clock,
             StopRequest() if stop is None else stop,
             self._watchers.read,
@@ -164,7 +168,7 @@ class Sequencer:
         self._look_back()
         if not self._is_enough():
             self._come_from_the_view_before()
-        while progress.todo or self._checking:
+        while progress.todo or self._checking or self._one_more():
             if self._is_enough() or not progress.todo:
                 self._tell(State.CHECKING)
                 self._finish_check()
@@ -191,6 +195,24 @@ class Sequencer:
             todo.clear()
             self._tell(self._state, f"ending early: {reason}")
         return bool(reason)
+
+    def _one_more(self) -> bool:
+        """Whether the guide, asked now that every frame is judged, has added a view."""
+        if self._guide is None or self._is_enough():
+            return False
+        view = self._arm.await_job(self._worker.do(self._guide.next_view))
+        if view is None:
+            return False
+        views = self._plan.file.views
+        file = self._plan.file.model_copy(update={"views": (*views, view)})
+        self._plan = replace(self._plan, file=file)
+        self._progress.todo.append(len(views))
+        here = joints_of(self._arm.watch())
+        there = self._arm.guard.joints_of(self._plan, len(views), here)
+        move_s = self._arm.guard.move_time_s(here, there)
+        self._time_left = replace(self._time_left, move_s=(*self._time_left.move_s, move_s))
+        self._journal.write("decided", view=len(views), name=view.name, joints_rad=there.tolist())
+        return True
 
     def _come_from_the_view_before(self) -> None:
         """A resumed run comes to its first view from where an unbroken one would have."""

@@ -13,6 +13,7 @@ from cell.files.plan_file import Plan
 from cell.recording import FrameRecord, Header, RecordingWriter
 from cell.recording.corners import FILE_NAME as DETECTIONS
 from cell.sequencer.goal import Goal
+from cell.sequencer.guide import Guide
 from cell.sequencer.journal import Journal, check_same_plan, skipped_views
 from cell.sequencer.progress import Progress
 from cell.sequencer.requests import Requests
@@ -33,6 +34,7 @@ def record_plan(
     requests: Requests | None = None,
     watchers: Iterable[Watcher] = (),
     goal: Goal | None = None,
+    guide: Guide | None = None,
 ) -> RunResult:
     """Run a plan into `folder`, from the main thread; signals stop it.
 
@@ -44,7 +46,7 @@ def record_plan(
         Whether the devices are; simulated and real frames are never mixed.
     resume:
         Go on with what `folder` has.
-    stop, requests, watchers, goal:
+    stop, requests, watchers, goal, guide:
         See `Sequencer`.
 
     Raises
@@ -67,6 +69,7 @@ def record_plan(
             requests=requests,
             watchers=watchers,
             goal=goal,
+            guide=guide,
         )
         try:
             result = sequencer.run()

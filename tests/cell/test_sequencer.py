@@ -12,12 +12,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cell.errors import EXIT_BAD_ANSWER, EXIT_DEVICE, EXIT_INPUT, EXIT_OPERATOR, EXIT_SAFETY
-from cell.files.plan_file import Plan, read_plan
+from cell.errors import (
+    EXIT_BAD_ANSWER,
+    EXIT_DEVICE,
+    EXIT_INPUT,
+    EXIT_OPERATOR,
+    EXIT_SAFETY,
+    InputError,
+)
+from cell.files.parts import Box
+from cell.files.plan_file import Plan, View, read_plan
 from cell.recording import Header, RecordingWriter, read_recording
 from cell.sequencer import sequencer as sequencer_module
 from cell.sequencer.checks import Verdict
 from cell.sequencer.clock import HostClock
+from cell.sequencer.guard import Guard
+from cell.sequencer.guide import Guide
 from cell.sequencer.journal import Journal, read_journal
 from cell.sequencer.progress import Progress
 from cell.sequencer.requests import Requests
@@ -27,8 +37,8 @@ from cell.sequencer.stop import StopRequest, signals_ask
 from cell.sequencer.watcher import Checked, Watcher
 from drivers.arm import ArmState
 from drivers.camera import Frame
-from drivers.errors import DeviceUnreachable, FrameLost, StopFailed
-from tests.cell.fakes import FakeArm, FakeCamera, FastClock
+from drivers.errors import DeviceUnreachable, FrameLost, SafetyError, StopFailed
+from tests.cell.fakes import HOME, FakeArm, FakeCamera, FastClock
 from tests.cell.plans import CELL, PLAN
 
 NO_BOARD = "checks: {board: false}\n"
@@ -63,7 +73,7 @@ class Bench:
         self.requests = Requests()
         self.watchers: list[Watcher] = [Listener()]
 
-    def run(self, progress: Progress | None = None) -> RunResult:
+    def run(self, progress: Progress | None = None, guide: Guide | None = None) -> RunResult:
         header = {"schema": "cell.recording/1", "board": self.plan.cell.board.model_dump()}
         header["images"] = "images/"
         writer = RecordingWriter.create(self.folder, Header.model_validate(header))
@@ -78,6 +88,7 @@ class Bench:
                 stop=self.stop,
                 requests=self.requests,
                 watchers=self.watchers,
+                guide=guide,
             )
             return sequencer.run()
 
@@ -447,3 +458,72 @@ def test_a_plan_with_a_bad_view_is_refused_before_the_first_move(
     assert message in result.reason
     assert "views.4 (view 4)" in result.reason
     assert "move" not in bench.arm.calls
+
+
+class AsFarAs(Guide):
+    """Two views beyond the plan's; notes what it has seen when asked."""
+
+    def __init__(self, guard: Guard) -> None:
+        self._guard, self.seen, self.seen_when_asked = guard, 0, []  # type: ignore[var-annotated]
+        self.fault: Exception | None = None
+
+    @property
+    def guard(self) -> Guard:
+        return self._guard
+
+    def checked(self, checked: Checked) -> None:
+        self.seen += 1
+
+    def next_view(self) -> View | None:
+        self.seen_when_asked.append(self.seen)
+        if self.fault is not None:
+            raise self.fault
+        turn = 10.0 + self.seen
+        return View(name="more", joints_deg=(0, -85, 90, -90, -90, turn)) if turn < 16 else None
+
+
+def test_a_guide_adds_views_when_all_before_are_judged(bench: Bench) -> None:
+    guide = AsFarAs(Guard.of(bench.plan))
+    result = bench.run(guide=guide)
+    assert (result.finish, result.frames) == (Finish.COMPLETED, 6)
+    assert guide.seen_when_asked == [4, 5, 6]
+    frames = read_recording(bench.folder).frames
+    assert [frame.view for frame in frames[4:]] == ["more", "more"]
+    assert np.degrees(frames[5].joints_rad or 0)[5] == pytest.approx(15)
+    assert bench.events().count("decided") == 2
+    assert isinstance(bench.watchers[0], Listener)
+    assert bench.watchers[0].statuses[-1].total == 6
+
+
+def test_a_guide_that_refuses_to_go_on_ends_the_run_stopped(bench: Bench) -> None:
+    guide = AsFarAs(Guard.of(bench.plan))
+    guide.fault = InputError("this cannot be the cell")
+    result = bench.run(guide=guide)
+    assert (result.finish, result.reason) == (Finish.BAD_INPUT, "this cannot be the cell")
+    assert bench.arm.calls[-2:] == ["stop", "close"]
+
+
+def test_every_move_passes_the_guides_own_guard(bench: Bench) -> None:
+    box = Box(name="new", low_m=(-1, -1, -1), high_m=(1, 1, 1))
+    cell = bench.plan.cell.model_copy(update={"keep_out": (box,)})
+    result = bench.run(guide=AsFarAs(Guard(cell, 0.1, 0.5)))
+    assert result.finish is Finish.SAFETY
+    assert "keep-out box `new`" in result.reason
+    assert "move" not in bench.arm.calls
+
+
+def test_the_corners_of_a_board_on_the_flange_are_checked(bench: Bench) -> None:
+    guard = Guard.of(bench.plan)
+    flange = guard.kinematics.forward(HOME)
+    carried = guard.cell.model_copy(update={"mount": "eye_to_hand"})
+    reach = flange @ [0.15, 0.12, 0.05, 1.0]  # the board's far corner, squares included
+    beside = Box(
+        name="beside",
+        low_m=tuple((reach[:3] - 0.01).tolist()),
+        high_m=tuple((reach[:3] + 0.01).tolist()),
+    )
+    boxed = carried.model_copy(update={"keep_out": (beside,)})
+    with pytest.raises(SafetyError, match="`beside`"):
+        Guard(boxed, 0.1, 0.5).check_move(HOME, HOME, "here")
+    in_hand = bench.plan.cell.model_copy(update={"keep_out": (beside,)})
+    Guard(in_hand, 0.1, 0.5).check_move(HOME, HOME, "here")

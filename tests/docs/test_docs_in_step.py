@@ -46,7 +46,8 @@ def test_the_readme_tour_says_what_it_shows(
 def test_the_readme_names_every_verb_and_exit_status() -> None:
     text = README.read_text()
     assert re.findall(r"^\| `cell (\w+)", text, re.MULTILINE) == [
-        "run", "plan", "simulate", "calibrate", "diagnose", "compare", "export", "import", "doctor",
+        "run", "bootstrap", "plan", "simulate", "calibrate", "diagnose", "compare", "export",
+        "import", "doctor",
     ]  # fmt: skip
     assert set(VERBS) == set(re.findall(r"^\| `cell (\w+)", text, re.MULTILINE))
     statuses = re.findall(r"^\| (\d) \| ", text, re.MULTILINE)

@@ -1,0 +1,177 @@
+"""`cell bootstrap`: look, move a little, find camera and board, plan the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calib.views import FloatArray
+from cell.bootstrap.found import Found
+from cell.bootstrap.guide import BootstrapGuide
+from cell.bootstrap.near_guard import JOINT_SPEED_DEG_S, SPEED_M_S, NearGuard
+from cell.bootstrap.standing import where_it_stands
+from cell.bootstrap.told import Told
+from cell.errors import InputError
+from cell.factory import real_devices, simulated_devices
+from cell.files.cell_file import CellFile, Layout, read_cell
+from cell.files.plan_file import SCHEMA, Plan, PlanFile
+from cell.files.writing import check_new, write_new, yaml_text
+from cell.planning import design_plan
+from cell.sequencer.sequencer import Devices
+from cell.sequencer.session import record_plan
+from cell.sequencer.states import Finish, RunResult
+from cell.sequencer.watcher import Watcher
+
+_MOVED_THROUGH = (Finish.COMPLETED, Finish.COMPLETED_WITH_LOSSES)
+
+
+@dataclass(frozen=True)
+class Bootstrap:
+    """A cell to be found, and where the results go.
+
+    Attributes
+    ----------
+    path, cell, layout:
+        The cell file, read.
+    told:
+        How far its layout may be off.
+    recording:
+        Folder of the frames.
+    found_path, plan_path:
+        Files to be written.
+    """
+
+    path: Path
+    cell: CellFile
+    layout: Layout
+    told: Told
+    recording: Path
+    found_path: Path
+    plan_path: Path
+
+    @classmethod
+    def of(cls, path: Path, recording: Path, beside: Path, told: Told) -> Bootstrap:
+        """Read the cell; nothing has moved yet.
+
+        Parameters
+        ----------
+        path, recording:
+            The cell file, and the folder of the frames.
+        beside:
+            Folder of the new cell and plan.
+        told:
+            How far the layout may be off.
+
+        Raises
+        ------
+        InputError
+            The cell does not say enough, or the results are in the way of older ones.
+        """
+        cell = read_cell(path)
+        if cell.layout is None:
+            raise InputError(
+                f"{path}: has no `layout`; write a rough one, 50 mm, 10° and, for the board,"
+                " 200 mm are near enough"
+            )
+        stem = path.name.split(".")[0]
+        found, plan = beside / f"{stem}.found.yaml", beside / f"{stem}.found.plan.yaml"
+        check_new(found)
+        check_new(plan)
+        return cls(path, cell, cell.layout, told, recording, found, plan)
+
+    def devices(self, *, dry_run: bool, start_deg: tuple[float, ...] | None = None) -> Devices:
+        """Arm and camera; in a dry run the arm stands at `start_deg`, or the layout's home."""
+        home_deg = self.layout.home_deg if start_deg is None else start_deg
+        layout = self.layout.model_copy(update={"home_deg": home_deg})
+        cell = self.cell.model_copy(update={"layout": layout})
+        plan = self._plan(np.radians(home_deg), cell)
+        return simulated_devices(plan) if dry_run else real_devices(plan)
+
+    def run(
+        self, devices: Devices, *, simulated: bool, watchers: Iterable[Watcher] = ()
+    ) -> Bootstrapped:
+        """Move, and find what the frames tell.
+
+        Raises
+        ------
+        InputError, SafetyError, DeviceError
+            Nothing was moved.
+        """
+        start_rad = where_it_stands(devices.arm)
+        guard = NearGuard.around(self.cell, start_rad, self.told)
+        guard.check_start()
+        guide = BootstrapGuide(self.cell, self.layout, guard, self.told)
+        result = record_plan(
+            self._plan(start_rad, self.cell),
+            self.recording,
+            devices,
+            simulated=simulated,
+            watchers=watchers,
+            guide=guide,
+        )
+        if result.finish not in _MOVED_THROUGH or guide.knowledge is None:
+            return Bootstrapped(result)
+        return Bootstrapped(result, Found.of(guide.knowledge), guide.refusal)
+
+    def _plan(self, start_rad: FloatArray, cell: CellFile) -> Plan:
+        """The view from where the arm stands; the guide adds the others."""
+        data = {
+            "schema": SCHEMA,
+            "name": f"bootstrap of {cell.name}",
+            "cell": cell,
+            "speed_m_s": SPEED_M_S,
+            "joint_speed_deg_s": JOINT_SPEED_DEG_S,
+            "exposure": {"focus": "auto" if cell.camera.focus == "auto" else "hold"},
+            "retry": {"attempts": 2, "give_up_after": 1},
+            "views": [{"name": "where it stood", "joints_rad": start_rad.tolist()}],
+        }
+        return Plan(self.path, PlanFile.model_validate(data), cell)
+
+    def write(self, done: Bootstrapped) -> int:
+        """Write the new cell and its plan; returns how many views that has.
+
+        Raises
+        ------
+        BadAnswer
+            What was found is not enough to plan with; nothing is written.
+        InputError
+            A file cannot be written, or the arm can take too few views: the cell is written then.
+        """
+        found = done.found
+        assert found is not None
+        found.check_good(done.refusal)
+        cell = found.in_cell(self.cell)
+        comment = [f"Found by `cell bootstrap {self.path.name}`; frames in {self.recording}."]
+        text = yaml_text(cell.as_mapping(), comment="\n".join(comment + found.lines()))
+        write_new(self.found_path, text)
+        try:
+            plan = design_plan(cell, cell_path=self.found_path.name)
+        except InputError as unplanned:
+            raise InputError(
+                f"{self.found_path} is written, but has no plan: {unplanned}"
+            ) from None
+        comment = [f"Made by `cell bootstrap {self.path.name}` for {self.found_path.name}."]
+        write_new(self.plan_path, yaml_text(plan.as_mapping(), comment=comment[0]))
+        return len(plan.views)
+
+
+@dataclass(frozen=True)
+class Bootstrapped:
+    """How the moves ended, and what they found.
+
+    Attributes
+    ----------
+    result:
+        How the moves ended.
+    found:
+        None where they ended too early.
+    refusal:
+        Why the last move that was left out, or made smaller, was.
+    """
+
+    result: RunResult
+    found: Found | None = None
+    refusal: str = ""

@@ -1,0 +1,159 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cell.bootstrap import Bootstrap, Told
+from cell.bootstrap.near_guard import NearGuard, enlarged
+from cell.cli.bootstrap import bootstrap as verb
+from cell.errors import InputError
+from cell.files.cell_file import CellFile, read_cell
+from cell.files.parts import Pose
+from cell.files.plan_file import read_plan
+from cell.files.writing import yaml_text
+from cell.recording import read_recording
+from cell.sequencer.journal import read_journal
+from cell.sequencer.states import Finish
+from drivers.errors import SafetyError
+from sim.arm import SimArm
+from tests.bootstrap.trials import Wrong, eye_to_hand, irb140, run_trial, ur3
+
+
+@pytest.mark.parametrize(
+    ("cell", "seed"),
+    [(lambda: irb140(shrunk=4), 3), (ur3, 4), (eye_to_hand, 5)],
+    ids=["irb140", "ur3", "eye_to_hand"],
+)
+def test_a_wrong_layout_is_found_without_leaving_the_neighbourhood(
+    cell: Callable[[], CellFile], seed: int, tmp_path: Path
+) -> None:
+    guessed = Wrong().layout_of(cell(), np.random.default_rng(seed))
+    trial = run_trial(guessed, tmp_path / "trial")
+    assert trial.error is None
+    assert trial.found is not None
+    assert trial.violations() == []
+    off_m, off_rad = trial.mounted_error()
+    assert off_m < 2e-3
+    assert off_rad < np.radians(0.2)
+    assert off_m < 5 * np.linalg.norm(trial.found.mounted_sigma_m)
+    whole, views = trial.planned_views_whole()
+    assert whole == views > 30
+    frames = read_recording(trial.task.recording).frames
+    assert frames[-1].view == "back where it started"
+    np.testing.assert_allclose(frames[-1].joints_rad, trial.start_rad, atol=1e-9)
+    assert read_plan(trial.task.plan_path).cell == read_cell(trial.task.found_path)
+    events = [event["event"] for event in read_journal(trial.task.recording)]
+    assert events.count("decided") == len(frames) - 1
+
+
+def written(cell: CellFile, folder: Path) -> Path:
+    path = folder / "some.cell.yaml"
+    path.write_text(yaml_text(cell.as_mapping()))
+    return path
+
+
+def moved(task: Bootstrap, start_deg: tuple[float, ...] | None = None):  # type: ignore[no-untyped-def]
+    devices = task.devices(dry_run=True, start_deg=start_deg)
+    assert isinstance(devices.arm, SimArm)
+    return devices, task.run(devices, simulated=True)
+
+
+def test_without_a_board_nothing_moves(tmp_path: Path) -> None:
+    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, Told())
+    devices, done = moved(task, (31, -77, -110, -10, 10, 17))
+    assert done.result.finish is Finish.GIVEN_UP
+    assert "board not found" in done.result.reason
+    assert (done.result.frames, done.found) == (0, None)
+    assert devices.arm.truth().joints_rad == pytest.approx(np.radians([31, -77, -110, -10, 10, 17]))
+
+
+def test_an_arm_of_another_model_is_not_moved(tmp_path: Path) -> None:
+    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, Told())
+    devices = task.devices(dry_run=True)
+    other = task.cell.model_copy(
+        update={"robot": task.cell.robot.model_copy(update={"model": "ur5"})}
+    )
+    done = replace(task, cell=other).run(devices, simulated=True)
+    assert done.result.finish is Finish.BAD_INPUT
+    assert "robot.model: a ur5 with these joint angles" in done.result.reason
+    assert devices.arm.moves_made <= 1
+
+
+def with_mounted(cell: CellFile, turn: Rotation) -> CellFile:
+    assert cell.layout is not None
+    pose = cell.layout.mounted.transform()
+    wrong = Pose.of(pose.from_components(pose.translation, pose.rotation * turn))
+    return cell.model_copy(update={"layout": cell.layout.model_copy(update={"mounted": wrong})})
+
+
+@pytest.mark.parametrize(
+    ("turn", "says", "most_moves"),
+    [
+        (Rotation.from_euler("x", 180, degrees=True), "layout: from here the picture", 1),
+        (Rotation.from_euler("z", 90, degrees=True), "the board does not move in the picture", 3),
+    ],
+)
+def test_a_layout_wrong_beyond_what_is_told_ends_the_moves(
+    turn: Rotation, says: str, most_moves: int, tmp_path: Path
+) -> None:
+    path = written(with_mounted(ur3(), turn), tmp_path)
+    task = Bootstrap.of(path, tmp_path / "run", tmp_path, Told())
+    devices, done = moved(task)
+    assert done.result.finish is Finish.BAD_INPUT
+    assert says in done.result.reason
+    assert devices.arm.moves_made <= most_moves
+
+
+def test_a_box_that_the_layout_may_reach_stops_it_before_the_first_move(tmp_path: Path) -> None:
+    cell = ur3()
+    assert cell.workspace is not None
+    low = cell.workspace.model_copy(update={"high_m": (0.6, 0.5, 0.42)})
+    path = written(cell.model_copy(update={"workspace": low}), tmp_path)
+    task = Bootstrap.of(path, tmp_path / "run", tmp_path, Told())
+    with pytest.raises(SafetyError, match=r"would leave the workspace.*drive the arm away"):
+        moved(task)
+    assert not (tmp_path / "run").exists()
+
+
+def test_boxes_grow_by_what_may_be_off() -> None:
+    told = Told(mount_m=0.04, mount_rad=0.1)
+    cell = ur3()
+    grown = enlarged(cell, told)
+    assert grown.workspace is not None
+    assert grown.workspace.high_m == pytest.approx((0.56, 0.46, 0.76))
+    assert grown.keep_out[0].low_m == pytest.approx((0.64, -0.54, -0.04))
+    beside = enlarged(eye_to_hand(), told).keep_out[0]
+    corner_m = np.hypot(0.16, 0.12)
+    assert 0.85 - beside.low_m[0] == pytest.approx(0.04 + 0.1 * corner_m, abs=1e-3)
+    with pytest.raises(InputError, match="nothing is left of it"):
+        enlarged(cell, Told(mount_m=0.6))
+
+
+def test_a_guard_keeps_near(tmp_path: Path) -> None:
+    start = np.radians([31.0, -77, -128, -10, 63, 17])
+    guard = NearGuard.around(ur3(), start, Told())
+    guard.check_move(start, start + np.radians([0, 0, 0, 0, 10, 0]), "little")
+    with pytest.raises(SafetyError, match="a bootstrap stays within 150 mm and 25°"):
+        guard.check_move(start, start + np.radians([0, 0, 0, 0, 0, 30]), "far")
+    with pytest.raises(SafetyError, match="a joint would turn too far"):
+        guard.check_move(start, start + np.radians([0, 0, 0, 0, 0, 70]), "farther")
+
+
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
+    path = written(ur3(), tmp_path)
+    (tmp_path / "some.found.yaml").write_text("mine")
+    with pytest.raises(InputError, match="is there already and is not overwritten"):
+        Bootstrap.of(path, tmp_path / "run", tmp_path, Told())
+
+
+def test_start_angles_are_checked(tmp_path: Path) -> None:
+    path = written(ur3(), tmp_path)
+    with pytest.raises(InputError, match="is not six angles"):
+        verb(path, dry_run=True, output=tmp_path, start_deg="1,2,3")
+    with pytest.raises(InputError, match="goes with --dry-run"):
+        verb(path, output=tmp_path, start_deg="1,2,3,4,5,6")
