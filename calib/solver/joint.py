@@ -25,6 +25,8 @@ from calib.views import FloatArray, Views
 
 GOOD_SIGMA = 3.0
 """A corner within this many sigma of its place counts fully."""
+SETTLED = 0.02
+"""Weights that change by less, and noise levels by less of themselves, move no estimate."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ def assemble(
         amount=prior[0],
         amount_information=prior[1],
         corner_numbers=0 if corner_shift is None else len(corner_shift),
-        observations=2 * int((weight > 0.0).sum()),
+        observations=2.0 * float(weight.sum()),
     )
     return equations, local.residual_px
 
@@ -250,14 +252,22 @@ class _Iteration:
         error = rigid.to_vector(rigid.from_vector(self.state.flange_error) @ rigid.from_vector(own))
         return replace(self.state, model=model, flange_error=error)
 
-    def refresh(self, *, noise: bool) -> None:
-        """Estimate the noise anew, and the corners' weights unless they are given."""
+    def refresh(self, *, noise: bool) -> bool:
+        """Estimate the noise anew, and the corners' weights unless they are given.
+
+        True where either changed by more than the estimates care for.
+        """
+        changed = False
         if noise:
             level, _ = estimate_noise(self.equations, self.state.noise)
+            changed = not level.near(self.state.noise, SETTLED)
             self.state = replace(self.state, noise=level)
         if self.robust:
-            self.weight = _robust_weight(self.residual, self.state.noise.corner_px)
+            weight = _robust_weight(self.residual, self.state.noise.corner_px)
+            changed = changed or bool(np.abs(weight - self.weight).max() > SETTLED)
+            self.weight = weight
             self.equations, self.residual = self._assemble(self.found, self.state)
+        return changed
 
 
 def _shift_of(model: CellModel, views: Views) -> FloatArray:
@@ -279,7 +289,7 @@ def fit_joint(
     noise: Noise,
     *,
     flange_error: FloatArray | None = None,
-    rounds: int = 3,
+    rounds: int = 10,
     fixed_noise: bool = False,
     weight: FloatArray | None = None,
     kinematics: ArmKinematics | None = None,
@@ -299,7 +309,7 @@ def fit_joint(
         Start of the noise levels; `print_m` above zero frees every corner within the board's
         plane, with that prior.
     rounds:
-        How often noise and weights are estimated anew.
+        How often noise and weights are estimated anew at most; they are until they stay.
     fixed_noise:
         Keep the noise levels as given.
     weight:
@@ -325,8 +335,9 @@ def fit_joint(
             settled = run.step()
             if settled:
                 break
-        if attempt < rounds - 1 or not fixed_noise:
-            run.refresh(noise=not fixed_noise)
+        last = attempt == rounds - 1
+        if (last and fixed_noise) or not run.refresh(noise=not fixed_noise):
+            break
     run.step()
     return _result(run, settled)
 

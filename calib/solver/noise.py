@@ -9,7 +9,7 @@ parameters (Pinheiro, Bates 2000, section 2.2.5).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from scipy.optimize import minimize
@@ -42,6 +42,10 @@ class Noise:
         """(6, 6) inverse covariance of the flange's error."""
         return np.diag([self.flange_m**-2.0] * 3 + [self.flange_rad**-2.0] * 3)
 
+    def near(self, other: Noise, share: float) -> bool:
+        """Whether every level differs from the other's by less than this share of it."""
+        return bool(np.allclose(astuple(self), astuple(other), rtol=share, atol=0.0))
+
 
 LEAST = Noise(1e-4, 1e-7, 1e-7, 1e-7)
 MOST = Noise(50.0, 0.3, 1.0, 5e-3)
@@ -63,7 +67,7 @@ class JointEquations:
     amount_information:
         (p,) inverse variances of the amounts' priors.
     corner_numbers, observations:
-        C and the number of scalar observations.
+        C and the number of scalar observations, each counted by its weight.
     """
 
     frames: FrameEquations
@@ -72,7 +76,7 @@ class JointEquations:
     amount: FloatArray
     amount_information: FloatArray
     corner_numbers: int
-    observations: int
+    observations: float
 
 
 @dataclass(frozen=True)
