@@ -1,35 +1,44 @@
 """Does the joint fit's uncertainty tell the truth, and how near does it come to it?
 
-    python benchmarks/coverage.py [RUNS] [PROCESSES]
+    python benchmarks/coverage.py [RUNS] [PROCESSES] [RESULTS.jsonl]
 
 Simulated cells: both of the paper's cameras and a plain 18 mm lens, both mounts, chessboard and
-ChArUco (a tenth of whose corners is hidden) in turn; 20 parallel and 30 tilted views, drawn anew in
-every run; a lens that focuses as a thin one does; corner noise 0.05 px, robot 0.05 mm and 0.005
-degrees, hand-eye and board unknown. The fit starts a per cent and some millimetres off and
-estimates its noise levels.
+ChArUco (a tenth of whose corners is hidden); 20 parallel and 30 tilted views, drawn anew in every
+run; a lens that focuses as a thin one does; corner noise 0.05 px, robot 0.05 mm and 0.005 degrees,
+hand-eye and board unknown. The fit starts a per cent off in focal length, 10 mm in distance and
+some millimetres across, and estimates its noise levels.
 
-Coverage: in how many runs the true value lies in the 95 % interval. Accuracy: root mean square over
-a run's frames, of the focal length and of the depth of the poses that its pictures give with the
-camera so found.
+Coverage: in how many runs the true value lies in the 95 % interval; of the numbers, of the pixel
+where a thing appears that the robot has the place of, and of the place of a part that one perfect
+picture locates. Accuracy: root mean square over a run's frames, of the focal length, of the depth
+that the joint fit gives each frame, and of the depth that each picture alone gives with the camera
+so found.
+
+Each run is written to RESULTS as it ends; those that stand there already are not run again.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from itertools import product
 from multiprocessing import Pool
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calib.calibration.uncertainty import optics_at, projection_sigma_px, workpiece_sigma_m
 from calib.chain import rigid
 from calib.chain.effects import make_effect
 from calib.chain.model import CellModel, walk
 from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
+from calib.chain.walk import Walk
 from calib.solver.free_poses import fit_free_poses
 from calib.solver.joint import JointFit, fit_joint
 from calib.solver.noise import Noise
@@ -45,23 +54,36 @@ CAMERAS = {
 }
 """Width, height, alpha far away, f in metres, k1, k2, nearest distance."""
 
-BOARDS = (
-    Board("chessboard", rows=7, cols=10, square_m=0.025),
-    Board("charuco", rows=7, cols=10, square_m=0.025, marker_m=0.018, dictionary="DICT_6X6_250"),
-)
+BOARDS = {
+    "chessboard": Board("chessboard", rows=7, cols=10, square_m=0.025),
+    "charuco": Board(
+        "charuco", rows=7, cols=10, square_m=0.025, marker_m=0.018, dictionary="DICT_6X6_250"
+    ),
+}
 MOUNTS: tuple[Mount, ...] = ("eye_in_hand", "eye_to_hand")
 FLANGE_FROM_MOUNTED = rigid.compose(np.array([0.02, -0.03, 0.7]), np.array([0.03, -0.04, 0.09]))
 BASE_FROM_FIXED = rigid.compose(np.array([0.1, 3.0, 0.2]), np.array([0.7, 0.1, 0.3]))
+
+
+IMAGE_SHARES = np.array([[0.5, 0.5], [0.15, 0.2], [0.9, 0.75]])
+"""Where in the image the errors in pixels and at the work piece are asked for,"""
+
+USED_AT_M = np.array([0.35, 0.9])
+"""and at which distances."""
+
+Task = tuple[str, Mount, str, int]
+"""Camera, mount, board, seed."""
 
 
 @dataclass(frozen=True)
 class Run:
     """One simulated run: pulls (error over sigma) by name, and errors over the frames."""
 
-    configuration: str
-    pulls: dict[str, float]
+    task: Task
+    pulls: dict[str, list[float]]
     alpha_rms_px: float
     depth_rms_m: float
+    picture_depth_rms_m: float
     seconds: float
 
 
@@ -82,11 +104,11 @@ def poses(board: Board, near_m: float, rng: np.random.Generator) -> FloatArray:
     return out
 
 
-def simulate(camera: str, mount: Mount, seed: int) -> tuple[CellModel, Views, Views]:
+def simulate(camera: str, mount: Mount, kind: str, seed: int) -> tuple[CellModel, Views, Views]:
     """The true cell, what it recorded, and the same with the flange where it truly was."""
     width, height, alpha, f_m, k1, k2, near_m = CAMERAS[camera]
     rng = np.random.default_rng(seed)
-    board = BOARDS[seed % 2]
+    board = BOARDS[kind]
     optics = optics_row(
         alpha_px=alpha,
         beta_px=alpha * 1.002,
@@ -115,11 +137,11 @@ def simulate(camera: str, mount: Mount, seed: int) -> tuple[CellModel, Views, Vi
 
 
 def start(true: CellModel) -> CellModel:
-    """A per cent, some millimetres, some tenths of a degree off, and no focus law."""
+    """A per cent, 10 mm ahead, some millimetres, some tenths of a degree off; no focus law."""
     optics = true.optics.copy()
     optics[[COLUMN["alpha_px"], COLUMN["beta_px"]]] *= 1.01
     optics[[COLUMN["k1"], COLUMN["k2"]]] = 0.0
-    nudge = rigid.from_vector(np.array([2e-3, -3e-3, 2e-3, 3e-3, -4e-3, 2e-3]))
+    nudge = rigid.from_vector(np.array([2e-3, -3e-3, 1e-2, 3e-3, -4e-3, 2e-3]))
     return CellModel(
         optics,
         true.flange_from_mounted @ nudge,
@@ -128,7 +150,7 @@ def start(true: CellModel) -> CellModel:
     )
 
 
-def pulls(fit: JointFit, true: CellModel) -> dict[str, float]:
+def pulls(fit: JointFit, true: CellModel) -> dict[str, list[float]]:
     """Error of every free number in units of its own sigma."""
     optics = [COLUMN[name] for name in PLAIN_OPTICS]
     found = fit.model
@@ -143,13 +165,56 @@ def pulls(fit: JointFit, true: CellModel) -> dict[str, float]:
         ]
     )
     sigma = np.sqrt(np.diag(fit.covariance))
-    return {u.name: float(z) for u, z in zip(fit.unknowns, error / sigma, strict=True)}
+    return {u.name: [float(z)] for u, z in zip(fit.unknowns, error / sigma, strict=True)}
 
 
-def one(task: tuple[str, Mount, int]) -> Run:
+def pulls_in_use(fit: JointFit, true: CellModel, views: Views) -> dict[str, list[float]]:
+    """Errors in pixels and at the work piece in units of what is told."""
+    name = "flange_from_mounted" if views.mount == "eye_in_hand" else "base_from_fixed"
+    found_from_true = rigid.inverse(getattr(fit.model, name)) @ getattr(true, name)
+    back = rigid.inverse(found_from_true)
+    pixels = IMAGE_SHARES * [views.width_px, views.height_px]
+    off_px, off_m = [], []
+    for d in USED_AT_M:
+        is_, told = (optics_at(cell, views, float(d)) for cell in (true, fit.model))
+        at = ahead(is_, pixels, float(d))
+        off_px.append(project(told[None], found_from_true[None], at)[0] - pixels)
+        part = flat_part(is_, views, float(d))
+        poses = rigid.compose(np.zeros_like(at), at)
+        n = len(poses)
+        seen = project(np.repeat(is_[None], n, 0), poses, part)
+        located = fit_free_poses(np.repeat(told[None], n, 0), poses, part, seen, ())
+        place = located.camera_from_board[:, :3, 3]
+        off_m.append(place @ back[:3, :3].T + back[:3, 3] - at)
+    sigma_px = projection_sigma_px(fit, views, pixels, USED_AT_M)
+    sigma_m = workpiece_sigma_m(fit, views, pixels, USED_AT_M)
+    return {
+        "pixel where a known place appears": (np.array(off_px) / sigma_px).ravel().tolist(),
+        "place of a part at work": (np.array(off_m) / sigma_m).ravel().tolist(),
+    }
+
+
+def ahead(optics: FloatArray, pixels_px: FloatArray, distance_m: float) -> FloatArray:
+    """(G, 3) points at that depth that appear at the pixels."""
+    points = np.column_stack([np.zeros_like(pixels_px), np.full(len(pixels_px), distance_m)])
+    eye = np.eye(4)[None]
+    for _ in range(30):
+        miss = pixels_px - project(optics[None], eye, points)[0]
+        points[:, :2] += miss * distance_m / optics[:2]
+    return points
+
+
+def flat_part(optics: FloatArray, views: Views, distance_m: float) -> FloatArray:
+    """(9, 3) points of the part that `workpiece_sigma_m` speaks of, about its middle."""
+    extent = float(np.ptp(views.board.corners_m[:, :2], axis=0).mean())
+    fifth = 0.2 * min(views.width_px, views.height_px) * distance_m / float(optics[0])
+    half = 0.5 * min(extent, fifth)
+    return np.array([[x, y, 0.0] for y in (-1, 0, 1) for x in (-1, 0, 1)]) * half
+
+
+def one(task: Task) -> Run:
     """Simulate one run, fit it, and compare."""
-    camera, mount, seed = task
-    true, views, exact = simulate(camera, mount, seed)
+    true, views, exact = simulate(*task)
     began = time.process_time()
     guess = start(true)
     fit = fit_joint(guess, views, unknowns_of(guess), Noise(0.2, 3e-4, 3e-4))
@@ -159,57 +224,97 @@ def one(task: tuple[str, Mount, int]) -> Run:
         state.optics, state.camera_from_board, state.points_m, views.corners_px, ()
     )
     truth = walk(true, exact)
-    centre = truth.points_m.mean(axis=0)
     alpha = COLUMN["alpha_px"]
-    off = (free.camera_from_board - truth.camera_from_board)[:, 2]
-    depth = off[:, :3] @ centre + off[:, 3]
     alpha_error = state.optics[:, alpha] - truth.optics[:, alpha]
     return Run(
-        f"{camera}, {mount}",
-        pulls(fit, true),
+        task,
+        pulls(fit, true) | pulls_in_use(fit, true, views),
         float(np.sqrt(np.mean(alpha_error**2))),
-        float(np.sqrt(np.mean(depth**2))),
+        depth_rms_m(state.camera_from_board, truth),
+        depth_rms_m(free.camera_from_board, truth),
         seconds,
     )
 
 
+def depth_rms_m(camera_from_board: FloatArray, truth: Walk) -> float:
+    """Of the board's middle along the optical axis."""
+    off = (camera_from_board - truth.camera_from_board)[:, 2]
+    depth = off[:, :3] @ truth.points_m.mean(axis=0) + off[:, 3]
+    return float(np.sqrt(np.mean(depth**2)))
+
+
 def table(runs: list[Run]) -> list[str]:
-    """Two tables in Markdown."""
-    lines = ["| cell | runs | α RMS px: median, 95 %, worst | depth RMS mm: median, 95 %, worst |"]
-    lines.append("|---|---|---|---|")
-    for name in sorted({r.configuration for r in runs}):
-        own = [r for r in runs if r.configuration == name]
-        alpha = np.quantile([r.alpha_rms_px for r in own], [0.5, 0.95, 1.0])
-        depth = np.quantile([1e3 * r.depth_rms_m for r in own], [0.5, 0.95, 1.0])
-        told = " | ".join(", ".join(f"{v:.3f}" for v in values) for values in (alpha, depth))
-        lines.append(f"| {name} | {len(own)} | {told} |")
+    """Two tables in Markdown; of the accuracies the median, 95 % and the worst."""
+    lines = [
+        "| cell | runs | α RMS px | depth RMS mm | depth RMS mm, pictures alone |",
+        "|---|---|---|---|---|",
+    ]
+    for cell in CELLS:
+        own = [r for r in runs if r.task[:3] == cell]
+        if not own:
+            continue
+        alpha = [r.alpha_rms_px for r in own]
+        depth = [1e3 * r.depth_rms_m for r in own]
+        alone = [1e3 * r.picture_depth_rms_m for r in own]
+        told = " | ".join(spread(values) for values in (alpha, depth, alone))
+        lines.append(f"| {', '.join(cell)} | {len(own)} | {told} |")
     lines += [
         "",
         "| number | coverage of the 95 % interval | rms of error / sigma |",
         "|---|---|---|",
     ]
     names = list(runs[0].pulls)
-    z = np.array([[r.pulls[name] for name in names] for r in runs])
-    for name, column in zip(names, z.T, strict=True):
-        inside = np.mean(np.abs(column) < 1.96)
-        lines.append(f"| {name} | {100 * inside:.1f} % | {np.sqrt(np.mean(column**2)):.3f} |")
-    inside = np.mean(np.abs(z) < 1.96)
-    lines.append(f"| all | {100 * inside:.1f} % | {np.sqrt(np.mean(z**2)):.3f} |")
+    pulls_of = {name: np.array([r.pulls[name] for r in runs]).ravel() for name in names}
+    single = np.concatenate([z for z in pulls_of.values() if len(z) == len(runs)])
+    for name, z in (*pulls_of.items(), ("all numbers", single)):
+        inside = np.mean(np.abs(z) < 1.96)
+        lines.append(f"| {name} | {100 * inside:.1f} % | {np.sqrt(np.mean(z**2)):.3f} |")
     return lines
+
+
+def spread(values: list[float]) -> str:
+    """Median, 95 % and worst."""
+    return ", ".join(f"{v:.3f}" for v in np.quantile(values, [0.5, 0.95, 1.0]))
+
+
+CELLS = list(product(CAMERAS, MOUNTS, BOARDS))
+
+
+def already(results: Path | None) -> list[Run]:
+    """Runs of an earlier start; a last line that was cut off goes."""
+    if results is None or not results.exists():
+        return []
+    text = results.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    results.write_text(whole, encoding="utf-8")
+    runs = [Run(**json.loads(line)) for line in whole.splitlines()]
+    return [replace(run, task=(*run.task[:3], run.task[3])) for run in runs]
+
+
+def kept(runs: Iterable[Run], results: Path | None) -> list[Run]:
+    """The runs, each written down as it ends."""
+    if results is None:
+        return list(runs)
+    done = []
+    with results.open("a", encoding="utf-8") as file:
+        for run in runs:
+            file.write(json.dumps(asdict(run)) + "\n")
+            file.flush()
+            done.append(run)
+    return done
 
 
 def main() -> None:
     """Print the tables."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 600
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 1200
     workers = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    cells = list(product(CAMERAS, MOUNTS))
-    tasks = [(*cells[i % len(cells)], i // len(cells)) for i in range(count)]
-    if workers > 1:
-        with Pool(workers) as pool:
-            runs = pool.map(one, tasks, chunksize=4)
-    else:
-        runs = [one(task) for task in tasks]
-    print(f"{datetime.now(UTC):%d %B %Y}, {count} runs,", end=" ")
+    results = Path(sys.argv[3]) if len(sys.argv) > 3 else None
+    tasks = [(*CELLS[i % len(CELLS)], i) for i in range(count)]
+    runs = [run for run in already(results) if run.task in tasks]
+    left = sorted(set(tasks) - {run.task for run in runs}, key=tasks.index)
+    with Pool(workers) as pool:
+        runs += kept(pool.imap_unordered(one, left, chunksize=4), results)
+    print(f"{datetime.now(UTC):%d %B %Y}, {len(runs)} runs,", end=" ")
     print(f"{np.median([r.seconds for r in runs]):.2f} s CPU a fit (median)\n")
     print("\n".join(table(runs)))
 

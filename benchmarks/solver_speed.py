@@ -98,7 +98,7 @@ def observed(frames: int) -> tuple[FloatArray, FloatArray]:
 def start(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Zhang's closed form: (K,) optics and (N, 4, 4) poses."""
     flat = BOARD.corners_m[:, :2]
-    homographies = np.array([robust_homography(flat, c) for c in corners])
+    homographies = np.array([robust_homography(flat, c)[0] for c in corners])
     row, poses = zhang_pinhole(homographies, WIDTH, HEIGHT)
     row[COLUMN["skew_px"]] = 0.0
     return row, poses

@@ -20,6 +20,9 @@ from calib.views import BoolArray, FloatArray, Views
 FRAME_OUTLIER = 6.0
 """A frame this many times worse than the median one is a wrong detection."""
 
+_ROUNDS = 8
+"""Wrong corners bend the fit that tells them: it is repeated until it leaves out the same."""
+
 CORNER_OUTLIER = 8.0
 _LONGEST_LENS = 25.0
 """Scale factor over image size: a field of 2.3 degrees, narrower than any cell's camera."""
@@ -70,13 +73,13 @@ def fit_baseline(views: Views, usable: Usable) -> Baseline:
     """
     missing: dict[str, str] = {}
     optics, poses = _start(views, usable, missing)
-    used, weight = usable.used.copy(), views.seen.astype(float)
+    used, weight = usable.used.copy(), usable.good.astype(float)
     rejected: list[Rejection] = list(usable.rejected)
-    for _ in range(4):
+    for _ in range(_ROUNDS):
         fit = fit_subset(views, used, optics, poses, weight, VALUES)
         worse = _bad_frames(fit.residual_px, views, used)
-        weight = _corner_weight(fit.residual_px, views, used)
-        if not worse:
+        before, weight = weight, _corner_weight(fit, views, used)
+        if not worse and np.array_equal(weight[used], before[used]):
             break
         rejected += worse
         used = used & ~np.isin(views.frame, [r.frame for r in worse])
@@ -190,9 +193,11 @@ def _square_px(views: Views, frame: int) -> float:
     return float(views.board.square_m * max(spread_px / max(spread_m, 1e-12), 0.0) ** 0.25)
 
 
-def _corner_weight(residual_px: FloatArray, views: Views, used: BoolArray) -> FloatArray:
-    """Zero for a corner far worse than its frame's typical one."""
-    distance = np.linalg.norm(np.nan_to_num(residual_px), axis=2)
+def _corner_weight(fit: FreePoseFit, views: Views, used: BoolArray) -> FloatArray:
+    """Zero for a corner far worse than its frame's typical one, whether it had a say or not."""
+    distance = np.zeros(views.seen.shape)
+    predicted = project(fit.optics[used], fit.camera_from_board[used], views.board.corners_m)
+    distance[used] = np.linalg.norm(np.nan_to_num(views.corners_px[used] - predicted), axis=2)
     typical = np.ones(len(views))
     for i in np.flatnonzero(used):
         typical[i] = max(float(np.median(distance[i, views.seen[i]])), 1e-6)

@@ -17,10 +17,11 @@ FRAMES_NEEDED = 3
 
 @dataclass(frozen=True)
 class Usable:
-    """(N, 3, 3) homographies, NaN where a frame is not usable; and why not."""
+    """(N, 3, 3) homographies, NaN where a frame has none; (N, M) corners near them; why not."""
 
     homographies: FloatArray
     used: BoolArray
+    good: BoolArray
     rejected: tuple[Rejection, ...]
 
 
@@ -33,6 +34,7 @@ def usable_frames(views: Views) -> Usable:
         Fewer than three frames are left.
     """
     homographies = np.full((len(views), 3, 3), np.nan)
+    good = np.zeros(views.seen.shape, dtype=bool)
     flat = views.board.corners_m[:, :2]
     rejected = []
     for i, frame in enumerate(views.frame):
@@ -42,12 +44,12 @@ def usable_frames(views: Views) -> Usable:
             rejected.append(Rejection(int(frame), reason))
             continue
         try:
-            homographies[i] = robust_homography(flat, views.corners_px[i])
+            homographies[i], good[i] = robust_homography(flat, views.corners_px[i])
         except CalibrationError as error:
             rejected.append(Rejection(int(frame), str(error)))
     used: BoolArray = np.asarray(np.isfinite(homographies).all(axis=(1, 2)))
     require_frames(int(used.sum()), len(views))
-    return Usable(homographies, used, tuple(rejected))
+    return Usable(homographies, used, good, tuple(rejected))
 
 
 def require_frames(usable: int, recorded: int) -> None:

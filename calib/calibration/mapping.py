@@ -46,6 +46,11 @@ def as_mapping(calibration: Calibration, recording: str) -> dict[str, Any]:
         "distance_range_m": list(c.distance_range_m),
         "frames_used": [int(f) for f in c.frame[c.used]],
         "frames_rejected": [{"frame": r.frame, "reason": r.reason} for r in c.rejected],
+        "corners_left_out": [
+            {"frame": int(f), "corners": np.flatnonzero(w).tolist()}
+            for f, w in zip(c.frame, c.wrong, strict=True)
+            if w.any()
+        ],
         "scale_factors": [_scale_factor(f) for f in c.scale_factors],
         "zones": None if c.zones is None else _zones(c.zones),
         "zones_reason": c.missing.get("zones"),

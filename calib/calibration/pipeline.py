@@ -18,7 +18,10 @@ from calib.chain.optics import COLUMN
 from calib.errors import CalibrationError
 from calib.handeye import camera_position_error_m
 from calib.solver.joint import JointFit
-from calib.views import FloatArray, Views
+from calib.views import BoolArray, FloatArray, Views
+
+_HARDLY = 0.1
+"""A corner of less weight lies more than five sigma off."""
 
 _ROBOT_RESULTS = (
     "robot",
@@ -65,6 +68,7 @@ def calibrate(views: Views) -> Calibration:
         frame=views.frame,
         used=baseline.used,
         rejected=tuple(sorted(baseline.rejected, key=lambda r: r.frame)),
+        wrong=_wrong_corners(views, baseline, robot),
         solutions=solutions,
         scale_factors=paper.scale_factors,
         zones=paper.zones,
@@ -78,6 +82,14 @@ def calibrate(views: Views) -> Calibration:
         weaknesses=_weaknesses(views, robot),
         uncertainty=_uncertainty(views, robot, span_m),
     )
+
+
+def _wrong_corners(views: Views, baseline: Baseline, robot: RobotFit | None) -> BoolArray:
+    """(N, M) corners that a fit left out: Zhang's, or in its frames the joint one's weights."""
+    wrong = baseline.weight == 0.0
+    if robot is not None and robot.joint is not None:
+        wrong[robot.taken] |= robot.joint.weight < _HARDLY
+    return np.asarray(wrong & views.seen & baseline.used[:, None])
 
 
 def _weaknesses(views: Views, robot: RobotFit | None) -> tuple[Weakness, ...]:
@@ -138,7 +150,9 @@ def joint_solution(views: Views, baseline: Baseline, robot: RobotFit, joint: Joi
     optics[robot.taken] = state.optics
     start = np.full((len(views), 4, 4), np.nan)
     start[robot.taken] = state.camera_from_board
-    fit = fit_subset(views, robot.taken, optics, start, baseline.weight, ())
+    weight = baseline.weight.copy()
+    weight[robot.taken] *= joint.weight >= _HARDLY
+    fit = fit_subset(views, robot.taken, optics, start, weight, ())
     at = float(np.median(board_depth_m(views, fit.camera_from_board)[robot.taken]))
     law = robot.reference.law
     middle = np.argmin(np.abs(state.distance_m - at))
@@ -146,7 +160,7 @@ def joint_solution(views: Views, baseline: Baseline, robot: RobotFit, joint: Joi
     return Solution(
         optics=fit.optics,
         camera_from_board=fit.camera_from_board,
-        residual_px=np.where(baseline.weight[..., None] > 0, fit.residual_px, np.nan),
+        residual_px=np.where(weight[..., None] > 0, fit.residual_px, np.nan),
         values={name: float(state.optics[middle, COLUMN[name]]) for name in (*VALUES, *further)},
         sigma={u.name: joint.sigma(u.name) for u in joint.unknowns if u.name in COLUMN},
         at_distance_m=None if law is None else float(state.distance_m[middle]),

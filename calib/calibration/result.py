@@ -184,6 +184,8 @@ class Calibration:
         (N,) frame numbers and which of them take part.
     rejected:
         The others, with reasons.
+    wrong:
+        (N, M) corners of used frames that lie far off and were left out.
     solutions:
         By name; a name that could not be computed is in `missing`, with the reason.
     scale_factors, zones, focus_law, beta_law:
@@ -205,6 +207,7 @@ class Calibration:
     frame: np.ndarray[tuple[int], np.dtype[np.int64]]
     used: BoolArray
     rejected: tuple[Rejection, ...]
+    wrong: BoolArray
     solutions: Mapping[str, Solution]
     scale_factors: tuple[ScaleFactor, ...]
     zones: Zones | None

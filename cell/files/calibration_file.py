@@ -216,6 +216,14 @@ class UncertaintyPart(_Part):
     """(D, G, 3) right, down, away: of where the robot is told a part is, from one picture."""
 
 
+class CornersLeftOut(_Part):
+    """Corners of a used frame that lie too far off to be detections of the board."""
+
+    frame: int
+    corners: tuple[int, ...]
+    """Counted row by row from the board's first corner."""
+
+
 class CalibrationFile(_Part):
     """The whole of `calibration.json`; metres, radians, pixels."""
 
@@ -235,6 +243,7 @@ class CalibrationFile(_Part):
     """Nearest and farthest board centre in the frames used."""
     frames_used: tuple[int, ...]
     frames_rejected: tuple[RejectedFrame, ...]
+    corners_left_out: tuple[CornersLeftOut, ...] = ()
     scale_factors: tuple[ScaleFactorPart, ...]
     zones: ZonesPart | None
     zones_reason: str | None

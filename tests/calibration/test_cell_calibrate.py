@@ -99,3 +99,19 @@ def test_half_turned_frames_of_a_symmetric_board_are_turned_back(tmp_path: Path)
     turned[[2, 9, 20]] = turned[[2, 9, 20], ::-1]
     plain = replace(views, board=even, corners_px=turned, corner_sigma_px=np.zeros((27, 63)))
     assert np.array_equal(same_order_everywhere(plain).corners_px, corners)
+
+
+def test_corners_far_off_stand_in_the_file_and_in_the_report(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    views = mixed_scene(noise_px=0.1).views
+    corners = views.corners_px.copy()
+    corners[4, [10, 33]] += 5.0
+    corners[8, 2] -= 6.0
+    folder = _write(tmp_path / "bench", replace(views, corners_px=corners))
+    _, out = calibrate_into(read_recording(folder), tmp_path / "out")
+    content = json.loads((out / "calibration.json").read_text())
+    told = {one["frame"]: one["corners"] for one in content["corners_left_out"]}
+    assert told == {4: [10, 33], 8: [2]}
+    report = (out / "report.html").read_text()
+    assert "3 corners lie far from the board and had no say (frames 4, 8)" in report

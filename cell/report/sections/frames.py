@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,7 @@ def frames(data: ReportData) -> str:
         words += f" {len(shown)} of {len(numbers)} are shown; every rejected one is."
     if data.thumbnail is None:
         words += " Pictures were not kept: only the corners are drawn."
+    words += _wrong_corners((data.calibration or {}).get("corners_left_out") or [])
     # reading and shrinking pictures is most of a report's time, and both leave the interpreter free
     with ThreadPoolExecutor(max_workers=_READERS) as readers:
         grid = "".join(readers.map(lambda f: _frame(data, f, rejected.get(f)), shown))
@@ -48,6 +50,15 @@ def _thinned(numbers: list[int], rejected: dict[int, str]) -> list[int]:
     """All frames, or so many of them that the page stays small enough to mail."""
     step = -(-len(numbers) // _MOST)
     return [n for k, n in enumerate(numbers) if k % step == 0 or n in rejected]
+
+
+def _wrong_corners(left_out: Sequence[Mapping[str, Any]]) -> str:
+    if not left_out:
+        return ""
+    count = sum(len(one["corners"]) for one in left_out)
+    corners, frames = ("corner lies", "frame") if count == 1 else ("corners lie", "frames")
+    where = ", ".join(str(one["frame"]) for one in left_out)
+    return f" {count} {corners} far from the board and had no say ({frames} {where})."
 
 
 def _reasons(rejected: dict[int, str]) -> str:
