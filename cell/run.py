@@ -29,7 +29,7 @@ from cell.simulated import home_of, simulated_cell
 
 
 def record(
-    plan_path: Path, folder: Path, *, dry_run: bool, resume: bool, peers: bool = False
+    plan: Plan, folder: Path, *, dry_run: bool, resume: bool, peers: bool = False
 ) -> RunResult:
     """Run a plan into a recording, with its progress in the terminal.
 
@@ -41,12 +41,11 @@ def record(
     Raises
     ------
     InputError, SafetyError
-        Plan or cell cannot be used, or a recording is in the way.
+        The cell cannot be used, or a recording is in the way.
     DeviceError
         `peers`, and a driver's packages are not installed or the peers do not start.
     """
-    plan = read_plan(plan_path)
-    say(f"{_devices_are(dry_run, peers)}; plan {plan_path}; recording {folder}")
+    say(f"{_devices_are(dry_run, peers)}; plan {plan.path}; recording {folder}")
     goal = None if plan.file.until is None else EarlyEnd(plan.file.until)
     with ExitStack() as stack:
         devices = stack.enter_context(_devices(plan, dry_run, peers))

@@ -20,6 +20,7 @@ from cell.cli.output import say_error
 from cell.cli.plan import plan
 from cell.cli.run import run
 from cell.cli.simulate import simulate
+from cell.cli.verify import verify
 from cell.errors import EXIT_OPERATOR, exit_status_of
 
 app = typer.Typer(
@@ -36,6 +37,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "calibrate": calibrate,
     "diagnose": diagnose,
     "compare": compare,
+    "verify": verify,
     "export": export,
     "import": import_,
     "doctor": doctor,

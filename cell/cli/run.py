@@ -38,13 +38,14 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Move, grab and log every view of a plan, then calibrate, diagnose and report."""
+    from cell.files.plan_file import read_plan
     from cell.run import Outcome, evaluate, record, truth_of
 
     if peers and not dry_run:
         raise InputError("--peers goes with --dry-run: cell run PLAN.yaml --dry-run --peers")
     path = _plan_path(plan, dry_run)
     folder = _folder(path, output, resume)
-    result = record(path, folder, dry_run=dry_run, resume=resume, peers=peers)
+    result = record(read_plan(path), folder, dry_run=dry_run, resume=resume, peers=peers)
     outcome = Outcome.of(result, folder)
     for view, reason in result.skipped.items():
         say(f"skipped view {view}: {reason}")

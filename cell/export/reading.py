@@ -123,6 +123,16 @@ class TransformSource(_Part):
         return RigidTransform.from_components(self.p_m, rotation).as_matrix()
 
 
+class RobotSource(_Part):
+    """What the joint fit said of robot and noise."""
+
+    mount: Literal["eye_in_hand", "eye_to_hand"]
+    source: Literal["joint", "hand_eye"]
+    flange_sigma_m: PositiveFloat
+    flange_sigma_rad: PositiveFloat
+    corner_sigma_px: PositiveFloat
+
+
 class CalibrationSource(_Part):
     """What a reader of `calibration.json` relies on."""
 
@@ -138,6 +148,7 @@ class CalibrationSource(_Part):
     base_from_board: TransformSource | None = None
     flange_from_board: TransformSource | None = None
     base_from_camera: TransformSource | None = None
+    robot: RobotSource | None = None
 
     @property
     def range_m(self) -> tuple[float, float] | None:

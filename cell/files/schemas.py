@@ -14,6 +14,7 @@ from cell.files.calibration_file import CalibrationFile
 from cell.files.cell_file import CellFile
 from cell.files.diagnosis_file import DiagnosisFile
 from cell.files.plan_file import PlanFile
+from cell.files.verify_file import VerifyFile
 
 FOLDER = Path(__file__).parents[1] / "schemas"
 MODELS: dict[str, type[BaseModel]] = {
@@ -21,6 +22,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "cell.schema.json": CellFile,
     "diagnosis.schema.json": DiagnosisFile,
     "plan.schema.json": PlanFile,
+    "verify.schema.json": VerifyFile,
 }
 
 
