@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from calib.errors import CalibrationError
 from calib.views import Views
 from cell.errors import BadAnswer, InputError
 from cell.files.calibration_file import CalibrationFile
+from cell.files.results import results_folder
 from cell.recording import Corners, FrameRecord, Recording, write_corners
 from cell.report import (
     ReportData,
@@ -141,10 +141,8 @@ def _first_reasons(corners: Corners) -> str:
 
 
 def default_folder(recording: Recording) -> Path:
-    """Where results go without `-o`: a folder in the recording, or here where that is read-only."""
-    if os.access(recording.path, os.W_OK):
-        return recording.path / "calibration"
-    return Path.cwd() / f"{recording.name}-calibration"
+    """Where results go without `-o`."""
+    return results_folder(recording.path, recording.name, "calibration")
 
 
 def calibrate_into(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -78,13 +77,14 @@ def _recording(
     source: Path, calibration: Path, dry_run: bool, views: int, output: Path | None
 ) -> tuple[Recording, Path]:
     """The recording to look at, taken now where `source` is a plan, and where results go."""
+    from cell.files.results import results_folder
     from cell.recording import read_recording
 
     if source.is_dir():
         if dry_run:
             raise InputError("--dry-run goes with a plan; a recording has been taken already")
         recording = read_recording(source)
-        return recording, output or _beside(recording)
+        return recording, output or results_folder(recording.path, recording.name, "verify")
     folder = output or new_folder(f"{source.name.split('.')[0]}-verify")
     _run(source, calibration, dry_run, views, folder)
     return read_recording(folder), folder
@@ -105,12 +105,6 @@ def _run(source: Path, calibration: Path, dry_run: bool, views: int, folder: Pat
     if not Outcome.of(result, folder).complete:
         say_error(result.reason or result.finish.words)
         raise typer.Exit(result.finish.exit_status)
-
-
-def _beside(recording: Recording) -> Path:
-    if os.access(recording.path, os.W_OK):
-        return recording.path / "verify"
-    return Path.cwd() / f"{recording.name}-verify"
 
 
 def _known(length_m: float | None, sigma_m: float, corners: str | None) -> KnownLength | None:

@@ -55,7 +55,7 @@ def text(comparison: Comparison) -> str:
     for letter, side in (("A", comparison.a), ("B", comparison.b)):
         lines.append(f"{letter}  {side.label}: recording {side.recording}, {side.solution}")
     for key, part in parts(comparison).items():
-        lines += ["", f"{TITLES[key]}: {verdict(part)}", *_aligned([HEAD, *table(part)])]
+        lines += ["", f"{TITLES[key]}: {verdict(part)}", *aligned([HEAD, *table(part)])]
     lines += [
         "",
         "px: B minus A over the image; chance: rms that the uncertainties alone would make;",
@@ -65,7 +65,8 @@ def text(comparison: Comparison) -> str:
     return "\n".join(lines)
 
 
-def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
+def aligned(rows: list[tuple[str, ...]]) -> list[str]:
+    """Rows as lines, their columns under each other."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [
         "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,6 +31,7 @@ from cell.diagnose.prediction import AFTER, BEFORE, write_prediction
 from cell.diagnose.separate import separations
 from cell.diagnose.twin import twin_text
 from cell.errors import BadAnswer, InputError
+from cell.files.results import results_folder, write_results
 from cell.recording import Corners, Recording, frames_as_views, read_frames
 from cell.report import diagnosis_evidence, simulation_truth, write_report
 
@@ -88,7 +88,9 @@ def diagnose_into(
     InputError
         A file is broken, or an effect's name is unknown.
     """
-    folder = default_folder(recording) if folder is None else folder
+    folder = (
+        results_folder(recording.path, recording.name, "diagnosis") if folder is None else folder
+    )
     forced = None if effects is None else [named(name) for name in effects]
     corners = corners_of(recording, progress)
     views = same_order_everywhere(recording.views(corners))
@@ -100,22 +102,15 @@ def diagnose_into(
     plans = separations(found, recording)
     notes = brightness_notes(recording, found)
     mapping = as_mapping(found, recording.name, plans, notes)
-    _write(folder, {DIAGNOSIS: json.dumps(mapping, indent=1) + "\n"})
-    _write(folder, {TWIN: twin_text(found, recording)})
-    _write(folder, {plan.file: plan.text for plan in plans if plan.file is not None})
+    write_results(folder, {DIAGNOSIS: json.dumps(mapping, indent=1) + "\n"})
+    write_results(folder, {TWIN: twin_text(found, recording)})
+    write_results(folder, {plan.file: plan.text for plan in plans if plan.file is not None})
     if ahead is not None:
         rows = np.isin(found.log.frame, ahead.frame)
         write_prediction(folder / BEFORE, found.plain.model, found.log.take(rows))
         write_prediction(folder / AFTER, found.twin.model, found.log.take(rows))
     _report(recording, folder, corners, found, mapping, simulated, calibrated, truth)
     return Diagnosed(found, mapping, folder)
-
-
-def default_folder(recording: Recording) -> Path:
-    """Where results go without `-o`."""
-    if os.access(recording.path, os.W_OK):
-        return recording.path / "diagnosis"
-    return Path.cwd() / f"{recording.name}-diagnosis"
 
 
 def named(name: str) -> Present:
@@ -139,19 +134,6 @@ def _together(views: Views, ahead: Views | None) -> Views:
     if ahead is None:
         return views
     return views.joined(ahead.take(~np.isin(ahead.frame, views.frame)))
-
-
-def _write(folder: Path, files: dict[str, str]) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, content in files.items():
-            partial = folder / f"{name}.part"
-            partial.write_text(content, encoding="utf-8")
-            partial.replace(folder / name)
-    except OSError as error:
-        raise InputError(
-            f"{folder}: cannot be written ({error.strerror}); give a folder with -o"
-        ) from None
 
 
 def _report(

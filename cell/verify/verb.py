@@ -10,6 +10,7 @@ from cell.calibrate import Progress, corners_of, same_order_everywhere
 from cell.errors import InputError
 from cell.export.place import calibration_file
 from cell.export.reading import read_calibration
+from cell.files.results import write_results
 from cell.files.verify_file import VerifyFile
 from cell.recording import Recording
 from cell.verify.check import check
@@ -82,14 +83,5 @@ def verify_into(
     )
     page = render(checked, simulated=recording.header.simulated)
     content = json.dumps(checked.content.model_dump(mode="json", by_alias=True), indent=1) + "\n"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in ((FILE_NAME, content), (PAGE_NAME, page)):
-            partial = folder / f"{name}.part"
-            partial.write_text(text, encoding="utf-8")
-            partial.replace(folder / name)
-    except OSError as fault:
-        raise InputError(
-            f"{folder}: cannot be written: {fault.strerror}; give another -o"
-        ) from None
+    write_results(folder, {FILE_NAME: content, PAGE_NAME: page})
     return Verified(checked.content, folder / FILE_NAME, folder / PAGE_NAME)

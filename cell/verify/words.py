@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cell.compare.telling import aligned
 from cell.files.verify_file import AlphaPart, LengthPart, MountPart, VerifyFile
 
 HEADS = {
@@ -177,8 +178,8 @@ def text(found: VerifyFile) -> str:
             f"{used} frames used, {left} left out; probability of a misfit as large by chance:"
             f" {found.p_value:.2g}"
         )
-        lines += ["", *_aligned([DISTANCE_HEAD, *distance_rows(found)])]
-        lines += ["", *_aligned([IMAGE_HEAD, *image_rows(found)])]
+        lines += ["", *aligned([DISTANCE_HEAD, *distance_rows(found)])]
+        lines += ["", *aligned([IMAGE_HEAD, *image_rows(found)])]
         lines += [
             "",
             "misfit: seen less predicted by the old calibration, the board where it fits best;",
@@ -189,11 +190,3 @@ def text(found: VerifyFile) -> str:
     lines += [f"frame {f.frame} left out: {f.reason}" for f in found.frames_left_out]
     lines += [f"note: {note}" for note in found.notes]
     return "\n".join(lines)
-
-
-def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return [
-        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
-        for row in rows
-    ]

@@ -61,7 +61,7 @@ def new_views(
     parallel: int = 3,
     tilted: int = 6,
 ) -> Views:
-    """Nine views of the cell after its camera, board or lens changed; `flange` times its scatter."""
+    """Views of the cell after camera, board or lens changed; `flange` times its scatter."""
     log = mixed_scene(parallel, tilted, seed=seed, mount=mount).views
     on_flange, in_base = (camera, board) if mount == "eye_in_hand" else (board, camera)
     model = CellModel(
