@@ -56,7 +56,7 @@ def test_results_go_beside_the_recording_or_here_where_it_is_read_only(
 ) -> None:
     recording = read_recording(_write(tmp_path / "bench", mixed_scene(noise_px=0.1).views))
     assert default_folder(recording) == tmp_path / "bench" / "calibration"
-    monkeypatch.setattr("cell.calibrate.os.access", lambda *_: False)
+    monkeypatch.setattr("cell.files.results.os.access", lambda *_: False)
     monkeypatch.chdir(tmp_path)
     assert default_folder(recording) == tmp_path / "bench-calibration"
 
