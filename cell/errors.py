@@ -5,6 +5,7 @@
     CellError                   carries the exit status of the contract
     ├── InputError              unusable input or arguments                      2
     ├── BadAnswer               the work was done and its answer is bad          1
+    ├── DiskFailed              the disk does not take what was recorded         3
     └── StoppedByOperator       Ctrl-C, a signal, or the Stop button             4
 
 Every message says what is wrong, where (file, line, key, frame) and what to do.
@@ -36,6 +37,12 @@ class InputError(CellError):
 
 class BadAnswer(CellError):
     """The work was done and its answer is bad: frames lost, no calibration possible."""
+
+
+class DiskFailed(CellError):
+    """The disk does not take what was recorded: full, read-only, broken."""
+
+    exit_status = EXIT_DEVICE
 
 
 class StoppedByOperator(CellError):

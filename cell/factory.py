@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 from cell.errors import InputError
 from cell.files.camera_file import (
@@ -98,7 +99,10 @@ def _ur_at(address: str) -> Arm:
 def _abb_at(url: str) -> Arm:
     from drivers.abb import ABBArm, ABBSettings
 
-    return ABBArm(url, ABBSettings(silence_s=5.0, connect_timeout_s=2.0, read_timeout_s=4.0))
+    return ABBArm(
+        url,
+        ABBSettings(silence_s=5.0, link_watch_s=4.0, connect_timeout_s=2.0, read_timeout_s=4.0),
+    )
 
 
 def _robotiq_at(address: str) -> Camera:
@@ -137,6 +141,8 @@ def arm_of(cell: CellFile) -> Arm:
         from drivers.abb import ABBArm, ABBSettings
 
         settings = ABBSettings(robot.user, robot.password, egm_port=robot.egm_port)
+        if not robot.link_watch:
+            settings = replace(settings, link_watch_s=None)
         return ABBArm(f"http://{robot.address}", settings)
     raise InputError(_only_simulated(cell, "arm"))
 

@@ -12,7 +12,7 @@ import time
 from dataclasses import dataclass
 
 from drivers.camera import FocusSetting
-from drivers.errors import DeviceError, DeviceRefused
+from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable
 from drivers.genicam_session import Features
 
 MODES = ("auto", "hold", "position")
@@ -74,6 +74,8 @@ class FocusControl:
         ------
         DeviceRefused
             The mode is unknown, the camera cannot do it, or the lens reports an error.
+        DeviceUnreachable
+            The lens lost its reference: the camera was off meanwhile.
         DeviceError
             The lens was not ready in time.
         """
@@ -88,7 +90,7 @@ class FocusControl:
         elif setting.position is not None:
             self._features.write(self._names.position, setting.position)
         if setting.mode != "hold" or self._busy():
-            self._wait_until_ready()
+            self._wait_until_ready(initialised=True)
         return self._confirmed(setting)
 
     def _require(self, setting: FocusSetting) -> None:
@@ -124,14 +126,21 @@ class FocusControl:
         focusing = self._features.has(auto) and self._features.read(auto) == self._names.auto_once
         return focusing or (state is not None and state not in self._names.ready)
 
-    def _wait_until_ready(self) -> None:
+    def _wait_until_ready(self, *, initialised: bool = False) -> None:
         deadline_s = time.monotonic() + self._timeout_s
         in_a_row = 0 if self._busy() else 1
         while in_a_row < _READY_IN_A_ROW:
             time.sleep(_POLL_S)
             in_a_row = 0 if self._busy() else in_a_row + 1
+            if initialised and self._state() in self._names.uninitialised:
+                raise DeviceUnreachable(
+                    "the lens has lost its reference, as after a loss of power; check its supply"
+                )
             if time.monotonic() > deadline_s:
-                raise DeviceError(f"the lens was not ready after {self._timeout_s:g} s")
+                raise DeviceError(
+                    f"the lens was not ready after {self._timeout_s:g} s: check its connection and"
+                    " supply"
+                )
 
     def _confirmed(self, setting: FocusSetting) -> float | None:
         got = self.position()

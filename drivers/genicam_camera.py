@@ -15,7 +15,7 @@ from typing import TypeVar
 
 from drivers.bounded import Bounded
 from drivers.camera import FocusSetting, Frame
-from drivers.errors import DeviceRefused, DeviceUnreachable
+from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable
 from drivers.genicam_open import GenICamOptions, OpenCamera
 from drivers.genicam_pixels import require_known
 from drivers.genicam_session import Session
@@ -155,11 +155,10 @@ class GenICamCamera(ABC):
     def _noticing(self, camera: OpenCamera, job: Callable[[OpenCamera], T]) -> T:
         try:
             return job(camera)
-        except DeviceUnreachable:
-            camera.note_lost()
-            raise
-        except DeviceRefused as error:
+        except DeviceError as error:
+            if isinstance(error, DeviceUnreachable):
+                camera.note_lost()
             raise self._named(error) from None
 
-    def _named(self, error: DeviceRefused) -> DeviceRefused:
-        return error if self.device in str(error) else DeviceRefused(f"{self.device}: {error}")
+    def _named(self, error: DeviceError) -> DeviceError:
+        return error if self.device in str(error) else type(error)(f"{self.device}: {error}")

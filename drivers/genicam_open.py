@@ -136,6 +136,9 @@ class OpenCamera:
 
     def _prepare(self, wanted: Mapping[str, float | None], focus: FocusSetting | None) -> None:
         features, options = self._session.features, self._options
+        if features.has("AcquisitionStop"):
+            # a program that crashed leaves it running, and then it takes no settings
+            features.execute("AcquisitionStop")
         self._settings = CameraSettings(features, options.names)
         self._settings.prepare(options.pixel_format, options.features)
         self.values = self._settings.set(wanted["exposure_s"], wanted["gain_db"])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from drivers.bounded import Bounded
 from drivers.camera import FocusSetting, Frame
-from drivers.errors import DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameLost
 from drivers.robotiq_http import PORT, RobotiqHttp
 from drivers.robotiq_settings import NO_SETTINGS, RobotiqSettings, values_of
 from drivers.untried import warn_untried
@@ -111,10 +111,10 @@ class RobotiqCamera:
     def _named(self, job: Callable[[float], T], deadline_s: float) -> T:
         try:
             return job(deadline_s)
-        except DeviceRefused as error:
+        except DeviceError as error:
             if self.device in str(error):
                 raise
-            raise DeviceRefused(f"{self.device}: {error}") from None
+            raise type(error)(f"{self.device}: {error}") from None
 
     def _connect(self, deadline_s: float) -> None:
         self._drop()

@@ -115,7 +115,9 @@ class RobotiqSettings:
             if len(seen) >= _SAME_IN_A_ROW and len(set(seen[-_SAME_IN_A_ROW:])) == 1:
                 return seen[-1]
             time.sleep(_POLL_S)
-        raise DeviceError("the automatic focus did not come to rest in time")
+        raise DeviceError(
+            "the automatic focus did not come to rest in time: is the board lit and in the picture?"
+        )
 
     def _change(self, wanted: Settings, deadline_s: float) -> Settings:
         if not self.supported:

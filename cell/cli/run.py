@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -40,6 +41,7 @@ def run(
     """Move, grab and log every view of a plan, then calibrate, diagnose and report."""
     from cell.files.plan_file import read_plan
     from cell.run import Outcome, evaluate, record, truth_of
+    from cell.sequencer.states import Finish
 
     if peers and not dry_run:
         raise InputError("--peers goes with --dry-run: cell run PLAN.yaml --dry-run --peers")
@@ -57,6 +59,10 @@ def run(
     show(text, outcome.mapping, as_json=as_json)
     if result.reason:
         say_error(result.reason)
+    if not outcome.complete and result.finish is not Finish.BAD_INPUT:
+        flags = {"--dry-run": dry_run, "--peers": peers, "--record-only": record_only}
+        words = ["cell", "run", str(path), "-o", str(folder), *(f for f in flags if flags[f])]
+        say(f"when that is mended, go on with: {shlex.join(words)} --resume")
     raise typer.Exit(result.finish.exit_status)
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from cell.doctor.finding import Finding
 from cell.doctor.ports import host_port, port
 from cell.files.cell_file import AbbRobot
+from drivers.abb.link_watch import LinkWatch
 from drivers.errors import DeviceError
 
 
 def abb(robot: AbbRobot) -> list[Finding]:
-    """The port of Robot Web Services, login, mode, motors, and whether a program runs."""
+    """The port of Robot Web Services, login, mode, motors, programs, the watch over the link."""
     answers = port("ABB Robot Web Services", *host_port(robot.address, 80))
     return [answers, *_state(robot)] if answers.ready else [answers]
 
@@ -28,7 +29,10 @@ def _state(robot: AbbRobot) -> list[Finding]:
     except DeviceError as refusal:
         mend = "correct what it says; robot.user and robot.password stand in the cell file"
         return [Finding("ABB login", False, str(refusal), mend)]
+    settings = ABBSettings()
+    watch = LinkWatch(url, rws, settings.link_watch_s if robot.link_watch else None)
     return [
+        _link_watch(watch, robot.link_watch),
         Finding("ABB mode and motors", fault is None, fault or "automatic, motors on", "see there"),
         Finding(
             "ABB program",
@@ -37,3 +41,15 @@ def _state(robot: AbbRobot) -> list[Finding]:
             "stop the RAPID program that runs",
         ),
     ]
+
+
+def _link_watch(watch: LinkWatch, wanted: bool) -> Finding:
+    name = "ABB link watch"
+    if not wanted:
+        mend = "load cell_watch.mod there and write `link_watch: true`"
+        return Finding(name, False, "none: a cut cable stops nothing", mend, needed=False)
+    try:
+        watch.check()
+    except DeviceError as missing:
+        return Finding(name, False, str(missing), "see there")
+    return Finding(name, True, "the controller stops a motion when this computer is silent")

@@ -65,6 +65,9 @@ class AbbRobot(SimulatedRobot):
     user: str = "Default User"
     password: str = "robotics"
     """The controller's factory default; give your own where it was changed."""
+    link_watch: bool = True
+    """The controller stops a motion by itself when this computer falls silent, for which
+    `cell_watch.mod` must be loaded there; with false, a cut cable stops nothing."""
     egm_port: int | None = Field(default=None, gt=0, lt=65536)
     """UDP port of this computer where the controller's EGM feedback arrives; null for none."""
 

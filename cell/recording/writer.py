@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, cast
+from typing import Any, cast
 
 import cv2
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cell.errors import InputError
 from cell.files.writing import yaml_text
+from cell.recording import disk
 from cell.recording import frames as frame_file
 from cell.recording import header as header_file
 from cell.recording.frames import FrameRecord, read_frames
@@ -32,7 +33,7 @@ class RecordingWriter:
     def __init__(self, folder: Path, header: Header) -> None:
         self.folder = folder
         self.header = header
-        self._lines: BinaryIO = (folder / frame_file.FILE_NAME).open("ab")
+        self._lines = (folder / frame_file.FILE_NAME).open("ab", buffering=0)
 
     @classmethod
     def create(cls, folder: Path, header: Header) -> RecordingWriter:
@@ -52,7 +53,7 @@ class RecordingWriter:
         except OSError as fault:
             raise InputError(f"{folder}: cannot be written: {fault.strerror}") from None
         _sync_file(folder / header_file.FILE_NAME)
-        _sync_folder(folder)
+        disk.sync_folder(folder)
         return cls(folder, header)
 
     @classmethod
@@ -79,24 +80,21 @@ class RecordingWriter:
         ------
         FileExistsError
             The recording has a picture of that frame number already.
-        OSError
+        DiskFailed
             The disk does not take it.
         """
-        if image is not None:
-            record = record.model_copy(update={"image": self._write_image(record.frame, image)})
-        self._lines.write(record.as_line().encode())
-        self._lines.flush()
-        os.fsync(self._lines.fileno())
+        with disk.told(self.folder):
+            if image is not None:
+                record = record.model_copy(update={"image": self._write_image(record.frame, image)})
+            disk.write_synced(self._lines, record.as_line().encode())
         return record
 
     def _write_image(self, frame: int, image: NDArray[np.generic]) -> str:
         name = Path(self.header.images or "images") / f"{frame:05d}.png"
         encoded = cv2.imencode(".png", cast("NDArray[np.integer[Any]]", image), _PNG_FAST)[1]
-        with (self.folder / name).open("xb") as file:
-            file.write(encoded.tobytes())
-            file.flush()
-            os.fsync(file.fileno())
-        _sync_folder((self.folder / name).parent)
+        with (self.folder / name).open("xb", buffering=0) as file:
+            disk.write_synced(file, encoded.tobytes())
+        disk.sync_folder((self.folder / name).parent)
         return name.as_posix()
 
     def say(self, **values: Any) -> None:
@@ -109,10 +107,11 @@ class RecordingWriter:
         told = {k: v for k, v in told.items() if k not in extra} | kept
         self.header = Header.model_validate(told)
         partial = self.folder / f"{header_file.FILE_NAME}.part"
-        partial.write_text(yaml_text(told), encoding="utf-8")
-        _sync_file(partial)
-        partial.replace(self.folder / header_file.FILE_NAME)
-        _sync_folder(self.folder)
+        with disk.told(self.folder):
+            partial.write_text(yaml_text(told), encoding="utf-8")
+            _sync_file(partial)
+            partial.replace(self.folder / header_file.FILE_NAME)
+            disk.sync_folder(self.folder)
 
     def close(self) -> None:
         """Let go of the files. Idempotent."""
@@ -154,11 +153,3 @@ def _set_unlogged_aside(images: Path, folder: Path, frames: tuple[FrameRecord, .
 def _sync_file(path: Path) -> None:
     with path.open("rb") as file:
         os.fsync(file.fileno())
-
-
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import fcntl
 import json
-import os
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from cell.errors import InputError
 from cell.files.plan_file import Plan
+from cell.recording.disk import told, write_synced
 
 FILE_NAME = "journal.jsonl"
 
@@ -27,7 +27,8 @@ class Journal:
     def __init__(self, folder: Path) -> None:
         path = folder / FILE_NAME
         torn = path.exists() and not path.read_bytes().endswith(b"\n")
-        self._file: BinaryIO = path.open("ab")
+        self._path = path
+        self._file = path.open("ab", buffering=0)
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -37,12 +38,11 @@ class Journal:
             self._file.write(b"\n")
 
     def write(self, event: str, **values: Any) -> None:
-        """Append one event and sync it to the disk."""
+        """Append one event and sync it to the disk; raises `DiskFailed`."""
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         line = json.dumps({"event": event, "at": now, **values}, default=str)
-        self._file.write(line.encode() + b"\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        with told(self._path):
+            write_synced(self._file, line.encode() + b"\n")
 
     def close(self) -> None:
         """Let go of the file. Idempotent."""

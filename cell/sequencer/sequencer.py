@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 from concurrent.futures import Future, wait
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 
 from calib.views import FloatArray
-from cell.errors import BadAnswer, exit_status_of
+from cell.errors import BadAnswer, DiskFailed, exit_status_of
 from cell.files.plan_file import Plan
 from cell.recording import RecordingWriter
 from cell.sequencer.checks import Verdict, check_frame
@@ -125,11 +126,12 @@ class Sequencer:
         except BaseException as fault:
             error = self._arm.stop(fault)
             self._tell(State.STOPPING)
-            self._keep_the_frame_in_hand()
+            with suppress(DiskFailed):
+                self._keep_the_frame_in_hand()
         self._let_go()
         finish = finish_of(error, len(self._progress.skipped))
         reason = str(error or "") or (type(error).__name__ if error else "")
-        self._journal.write("stop", finish=finish.name.lower(), reason=reason or self._ended_early)
+        self._note("stop", finish=finish.name.lower(), reason=reason or self._ended_early)
         self._tell(State.FINISHED)
         if error is not None and exit_status_of(error) is None:
             raise error
@@ -371,7 +373,12 @@ class Sequencer:
             try:
                 close()
             except Exception as fault:
-                self._journal.write("close failed", device=name, reason=str(fault))
+                self._note("close failed", device=name, reason=str(fault))
+
+    def _note(self, event: str, **values: object) -> None:
+        """Journal what nothing depends on; a full disk must not keep the run from ending."""
+        with suppress(DiskFailed):
+            self._journal.write(event, **values)
 
     def _tell(self, state: State, event: str | None = None) -> None:
         """Tell the watchers; one that fails (a terminal that is gone) is not told again."""
@@ -389,4 +396,4 @@ class Sequencer:
         )
         self._watchers.told(status)
         while self._watchers.failures:
-            self._journal.write("listener failed", reason=self._watchers.failures.pop())
+            self._note("listener failed", reason=self._watchers.failures.pop())

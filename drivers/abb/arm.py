@@ -43,7 +43,7 @@ class ABBArm:
         DeviceUnreachable
             No answer.
         DeviceRefused
-            Wrong password, or a RAPID program is running already.
+            Wrong password, a RAPID program is running already, or no task there watches the link.
         ArmStopped
             Not in automatic mode, motors off, or stopped for safety.
         """
@@ -137,11 +137,20 @@ class ABBArm:
             raise DeviceUnreachable(
                 self._named(
                     f"no robot state for {supervisor.silent_s:.1f} s. The arm was told to stop, "
-                    "which nobody confirms: look at it, and press the emergency stop if it moves. "
+                    f"which nobody confirms{self._watched()}: look at it, and press the emergency "
+                    "stop if it moves. "
                     "Check the network and the controller, then connect again"
                 )
             )
         return supervisor.newest
+
+    def _watched(self) -> str:
+        limit_s = self._settings.link_watch_s
+        return (
+            ""
+            if limit_s is None
+            else f"; its controller stops it {limit_s:g} s after the last sign"
+        )
 
     def _connected(self) -> Supervisor:
         if self._supervisor is None:

@@ -51,12 +51,20 @@ def build_program(target: MoveTarget, reading: Reading, world_from_base: RigidTr
 
 def missed(target: MoveTarget, reading: Reading) -> str | None:
     """Return how far from its target the arm stands, or None where it arrived."""
+    off_m, off_rad = _off(target, reading)
+    if off_m <= _ARRIVED_M and off_rad <= _ARRIVED_RAD:
+        return None
+    return f"{off_rad:.3f} rad" if off_m == 0.0 else f"{off_m * 1e3:.1f} mm and {off_rad:.3f} rad"
+
+
+def way_left(target: MoveTarget, reading: Reading) -> float:
+    """Return how far the arm still has to go, in metres or radians: whichever are more."""
+    return max(_off(target, reading))
+
+
+def _off(target: MoveTarget, reading: Reading) -> tuple[float, float]:
     if target.joints_rad is not None:
-        off_rad = float(np.abs(np.subtract(reading.joints_rad, target.joints_rad)).max())
-        return f"{off_rad:.3f} rad" if off_rad > _ARRIVED_RAD else None
+        return 0.0, float(np.abs(np.subtract(reading.joints_rad, target.joints_rad)).max())
     assert target.base_from_flange is not None
     off = reading.base_from_flange.inv() * target.base_from_flange
-    off_m, off_rad = float(np.linalg.norm(off.translation)), float(off.rotation.magnitude())
-    return (
-        f"{off_m * 1e3:.1f} mm and {off_rad:.3f} rad" if off_m > 0.002 or off_rad > 0.01 else None
-    )
+    return float(np.linalg.norm(off.translation)), float(off.rotation.magnitude())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ class Reading:
     Attributes
     ----------
     host_t_s:
-        Host clock (`time.monotonic`) when it was complete.
+        Host clock (`time.monotonic`) when it was asked for, or when EGM's message came.
     controller_t_s:
         The controller's clock; None from RWS, which tells none.
     joints_rad:
@@ -42,9 +42,15 @@ class Reading:
     raw: dict[str, Any]
 
 
-def read_rws(rws: Any, now_s: float) -> Reading:
-    """Ask for joints and flange pose, in two requests; they are of one instant if it stands."""
+def read_rws(rws: Any, now_s: float, before: Reading | None = None) -> Reading:
+    """Ask for joints and flange pose, in two requests; they are of one instant if it stands.
+
+    Where the joints are what they were in the reading `before`, to the last digit that the
+    controller tells, so is the pose, and it is not asked for again.
+    """
     joints = rws.get_jointtarget()
+    if before is not None and before.raw.get("jointtarget_deg") == joints.robax.tolist():
+        return replace(before, host_t_s=now_s)
     pose = rws.get_robtarget(tool="tool0", wobj="wobj0", coordinate="Base")
     return Reading(
         host_t_s=now_s,

@@ -21,10 +21,13 @@ class ABBSettings:
     user, password:
         Of Robot Web Services; ABB's own defaults.
     poll_s:
-        Between two questions whether RAPID still runs; at rest, where the pose is asked for too,
-        it is twice as long. The controller bears fewer than twenty requests a second.
+        Between two questions to an arm on its way; see `drivers.abb.pace`. The controller bears
+        fewer than twenty requests a second.
     silence_s:
         Without a fresh reading for so long, the link counts as lost and the arm is told to stop.
+    link_watch_s:
+        The controller stops a motion when it hears nothing from here for so long; None where
+        `rapid/cell_watch.mod` is not loaded there, and then a cut cable stops nothing.
     connect_timeout_s, read_timeout_s:
         Of every request.
     egm_port:
@@ -37,8 +40,9 @@ class ABBSettings:
 
     user: str = "Default User"
     password: str = "robotics"
-    poll_s: float = 0.1
+    poll_s: float = 0.2
     silence_s: float = 1.0
+    link_watch_s: float | None = 0.6
     connect_timeout_s: float = 0.5
     read_timeout_s: float = 0.8
     egm_port: int | None = None

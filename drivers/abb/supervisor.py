@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from drivers.abb.link_watch import LinkWatch
+from drivers.abb.pace import Pace
 from drivers.abb.program import build_program, missed
 from drivers.abb.readings import Reading, read_rws
 from drivers.abb.rws import Cancelled, named, open_rws
@@ -30,7 +32,7 @@ from drivers.arm import MoveTarget
 from drivers.errors import DeviceError, DeviceUnreachable
 
 _AT_REST_RAD = 1e-4
-_PANEL_EVERY, _POSE_EVERY = 7, 4
+_PANEL_EVERY, _POSE_EVERY = 9, 2
 _STOP_CONFIRM_S = 2.0
 _CLOSE_S = 1.0
 _START_S = 0.5  # between the answer to a start and the motion
@@ -61,6 +63,8 @@ class Supervisor:
         self._settings = settings
         self._rws = open_rws(url, settings, self._check_cancelled)
         self._stopper = Stopper(url, settings)
+        self._watch = LinkWatch(url, self._rws, settings.link_watch_s)
+        self._pace = Pace(settings.poll_s)
         self._lock = threading.RLock()
         self._cancelled = threading.Event()
         self._wake = threading.Event()
@@ -93,6 +97,9 @@ class Supervisor:
     def start(self, world_from_base: RigidTransform) -> None:
         """Log the stopper in, take the first readings, and begin to poll; raises `DeviceError`."""
         self.world_from_base = world_from_base
+        self._watch.check()
+        with named(self._url):
+            self._watch.reset()
         self._stopper.open()
         self._poll()
         self._poll()
@@ -127,8 +134,11 @@ class Supervisor:
             self._thread.join(timeout=_CLOSE_S)
 
     def _check_cancelled(self, method: str, address: str) -> None:
-        if _START_ACTION in address and (self._cancelled.is_set() or self._closing):
+        if _START_ACTION not in address:
+            return
+        if self._cancelled.is_set() or self._closing:
             raise Cancelled(method)
+        self._watch.begin()
 
     def _run(self) -> None:
         while not self._closing:
@@ -142,11 +152,11 @@ class Supervisor:
                 if self.silent_s > self._settings.silence_s:
                     self._trip(str(error))
             except DeviceError as error:
-                self._trip(str(error))
+                self._trip(self._explained(error))
             except Exception as error:
                 # nobody would watch the arm any more: whatever it is, stop first
                 self._trip(f"the driver's supervision failed: {error!r}")
-            self._wake.wait(self._pause_s())
+            self._wake.wait(self._pace.pause_s(running=self._running, still=self._still))
             self._wake.clear()
 
     def _begin_order(self) -> None:
@@ -160,33 +170,41 @@ class Supervisor:
             executor = client.MotionProgramExecClient(abb_client=self._rws)
             executor.execute_motion_program(program, wait=False)
         order.started_s = time.monotonic()
+        self._pace.begin(order.target, reading)
         self._still = False
         if self._cancelled.is_set():
             self._stopper.order()
 
     def _poll(self) -> None:
-        """Ask whether RAPID runs, and for the pose: always at rest, now and then on the way."""
+        """Vouch for the motion; ask whether RAPID runs, and where the arm is.
+
+        At rest, where nothing has changed, one question in a while does for the former.
+        """
+        self._polls += 1
+        in_turn = self._polls % _PANEL_EVERY == 0
         with named(self._url):
-            self._running = self._rws.get_execution_state().ctrlexecstate == "running"
-            self._polls += 1
+            self._vouch()
+            if in_turn or not self._still:
+                self._running = self._rws.get_execution_state().ctrlexecstate == "running"
             self._still = self._still and not self._running
             if not self._running or self._polls % _POSE_EVERY == 0:
-                self._take(read_rws(self._rws, time.monotonic()))
-            if self._polls % _PANEL_EVERY == 0:
-                panel = fault_in(self._rws)
-                if panel is not None:
-                    self._trip(panel)
+                self._take(read_rws(self._rws, time.monotonic(), self.newest))
+            panel = fault_in(self._rws) if in_turn else None
+        if panel is not None:
+            self._trip(panel)
+
+    def _vouch(self) -> None:
+        if self._order is None and self._still:
+            self._watch.end()
+        else:
+            self._watch.beat()
 
     def _take(self, reading: Reading) -> None:
         before = self.newest
         moved = before is None or _apart(before, reading) > _AT_REST_RAD
         self.newest, self._still = reading, not (self._running or moved)
-
-    def _pause_s(self) -> float:
-        """Time to the next poll: the controller bears fewer than twenty requests a second."""
-        if self._still:
-            return 2.0 * self._settings.poll_s
-        return self._settings.poll_s if self._running else 0.5 * self._settings.poll_s
+        if self._running:
+            self._pace.on_the_way(reading)
 
     def _judge(self) -> None:
         with self._lock:
@@ -224,8 +242,16 @@ class Supervisor:
             panel = fault_in(self._rws)
             if panel is not None:
                 return panel
-            failure = failure_in_log(self._rws)
+            failure = self._watch.stopped() or failure_in_log(self._rws)
         return f"the motion ended {off} from its target ({failure or 'no reason logged'})"
+
+    def _explained(self, error: DeviceError) -> str:
+        """What the panel says, which may be why something was refused, or else the error."""
+        try:
+            with named(self._url):
+                return fault_in(self._rws) or str(error)
+        except DeviceError:
+            return str(error)
 
     def _trip(self, fault: str) -> None:
         if self.fault is None:

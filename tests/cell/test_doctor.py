@@ -115,6 +115,21 @@ def test_an_abb_arm_in_manual_mode_is_named(tmp_path: Path, abb: ABBController) 
     assert "turn the key to automatic" in by_name(examine(cell), "ABB mode").line()
 
 
+def test_a_controller_that_does_not_watch_the_link_is_named(
+    tmp_path: Path, abb: ABBController
+) -> None:
+    limits = abb.watch.values["limit"] = 7.0
+    assert by_name(examine(abb_cell(tmp_path, abb)), "ABB link watch").ready
+    assert abb.watch.values["limit"] == limits  # the doctor changes nothing
+    abb.watch.running = False
+    assert "restart the controller" in by_name(examine(abb_cell(tmp_path, abb)), "ABB link").line()
+    abb.watch.loaded = False
+    assert by_name(examine(abb_cell(tmp_path, abb)), "ABB link watch").blocks
+    without = by_name(examine(abb_cell(tmp_path, abb, ", link_watch: false")), "ABB link watch")
+    assert not without.blocks
+    assert "a cut cable stops nothing" in without.line()
+
+
 def test_a_wrong_password_is_named(tmp_path: Path, abb: ABBController) -> None:
     findings = examine(abb_cell(tmp_path, abb, ", password: wrong"))
     login = by_name(findings, "ABB login")

@@ -10,6 +10,7 @@ from scipy.spatial.transform import RigidTransform
 
 from drivers.arm import Arm, Motion, MoveTarget
 from drivers.errors import DeviceError, SafetyError
+from sim.peers.abb.cell_watch import CellWatch
 from sim.peers.abb.egm import EgmSender
 from sim.peers.abb.event_log import EventLog
 from sim.peers.abb.http_server import RwsServer
@@ -64,6 +65,8 @@ class ABBController:
         Where the arm is mounted; work objects and EGM refer to the world.
     flange_from_active_tool:
         What RWS takes for the tool where a request names none.
+    watch:
+        The background task that stops the motion when nobody vouches for it.
     events, request_times_s:
         Orders and halts of the arm; when each HTTP request came.
     """
@@ -83,6 +86,7 @@ class ABBController:
         self.running = False
         self.world_from_base = RigidTransform.identity()
         self.flange_from_active_tool = RigidTransform.identity()
+        self.watch = CellWatch(self.stop)
         self._egm = EgmSender(self, (address, egm_port)) if egm_port else None
         self._stop_rapid = threading.Event()
         self._program: threading.Thread | None = None
@@ -91,6 +95,7 @@ class ABBController:
     def __enter__(self) -> ABBController:
         self.arm.connect()
         self._http = RwsServer(self)
+        self.watch.start()
         if self._egm is not None:
             self._egm.start()
         return self
@@ -122,6 +127,7 @@ class ABBController:
         """The controller dies: ports closed, brakes on."""
         self.faults.mute = False
         self._http.close()
+        self.watch.close()
         if self._egm is not None:
             self._egm.close()
         self.stop("controller killed")
@@ -129,6 +135,11 @@ class ABBController:
     def drop(self) -> None:
         """Close every connection and keep accepting."""
         self._http.drop()
+
+    def restore(self) -> None:
+        """Cable in, guard closed, button released, key to automatic, motors on."""
+        self.faults = ABBFaults()
+        self.panel = PanelState()
 
     def _safety_stop(self, state: str) -> None:
         self.panel.controller = state

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import json
 import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from sim.peers.abb.digest import DigestLogin
 from sim.peers.abb.resources import Answer, Resources, error
-from sim.peers.listener import shut
+from sim.peers.http import DroppableServer
 
 if TYPE_CHECKING:
     from sim.peers.abb.controller import ABBController
@@ -26,7 +26,7 @@ class RwsServer:
 
     def __init__(self, controller: ABBController) -> None:
         handler = type("Handler", (_Handler,), {"resources": Resources(controller)})
-        self._server = _Server((controller.address, controller.port), handler)
+        self._server = DroppableServer((controller.address, controller.port), handler)
         self._thread = threading.Thread(
             target=self._server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True
         )
@@ -34,34 +34,11 @@ class RwsServer:
 
     def drop(self) -> None:
         """Close every connection."""
-        for link in list(self._server.connections):
-            shut(link)
+        self._server.drop()
 
     def close(self) -> None:
         """Close the port and every connection."""
-        self._server.shutdown()
-        self._server.server_close()
-        self.drop()
-
-
-class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-    allow_reuse_address = True
-
-    def __init__(self, *arguments: Any) -> None:
-        self.connections: set[Any] = set()
-        super().__init__(*arguments)
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        self.connections.add(request)
-        super().process_request(request, client_address)
-
-    def shutdown_request(self, request: Any) -> None:
-        self.connections.discard(request)
-        super().shutdown_request(request)
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A client that goes away in the middle is nothing to write home about."""
+        self._server.end()
 
 
 class _Handler(BaseHTTPRequestHandler):

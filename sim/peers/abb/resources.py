@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs
 
 import numpy as np
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 _UNUSED_AXIS = "9E+09"
 _FILES = "fileservice/"
 _RAMDISK = "RAMDISK"
+_WATCH = "rw/rapid/symbol/data/RAPID/T_CELL_WATCH/cell_watch/cell_watch_"
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class Resources:
         self._controller.request_times_s.append(time.monotonic())
         if path.startswith(_FILES):
             return self._file(method, path.removeprefix(_FILES), body)
+        if path.startswith(_WATCH) and self._controller.watch.loaded:
+            return self._watched(method, path.removeprefix(_WATCH), body)
         if method == "GET" and path == self._robtarget_path:
             return self._robtarget(query)
         if method == "GET" and path in self._gets:
@@ -137,6 +141,13 @@ class Resources:
         self._controller.note("rws: motors off")
         self._controller.panel.controller = "motoroff"
         self._controller.stop("motors off")
+        return Answer(204)
+
+    def _watched(self, method: str, name: str, body: bytes) -> Answer:
+        values = self._controller.watch.values
+        if method == "GET":
+            return state({"_type": "rap-data", "value": f"{values[name]:g}"})
+        values[name] = float(parse_qs(body.decode())["value"][0])
         return Answer(204)
 
     def _file(self, method: str, name: str, body: bytes) -> Answer:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 from sim.peers.gige.gvcp import Refused, Status
 
 Host = tuple[str, int]
 _EXCLUSIVE_OR_CONTROL = 0x3
+_ANOTHER_PROGRAM = ("127.255.255.254", 9)
 
 
 class ControlPrivilege:
@@ -33,6 +35,14 @@ class ControlPrivilege:
             raise Refused(Status.ACCESS_DENIED)
         self.holder = host if privilege & _EXCLUSIVE_OR_CONTROL else None
         self._heard_s = time.monotonic()
+
+    def seize(self) -> None:
+        """Another program takes it, and does not let go until `release`."""
+        self.holder, self._heard_s = _ANOTHER_PROGRAM, math.inf
+
+    def release(self) -> None:
+        """Whoever has it gives it back."""
+        self.holder = None
 
     def expired(self, heartbeat_s: float) -> bool:
         """Whether the holder has been silent for longer than that; it then holds it no more."""

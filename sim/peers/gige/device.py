@@ -126,6 +126,16 @@ class GigEPeer:
 
     close = kill
 
+    def seize_control(self) -> None:
+        """Another program takes the camera over, and keeps it until `release_control`."""
+        self.control.seize()
+        self.streamer.halt()
+
+    def release_control(self) -> None:
+        """Whoever controls the camera lets go."""
+        self.control.release()
+        self.streamer.halt()
+
     def __enter__(self) -> GigEPeer:
         return self.start()
 

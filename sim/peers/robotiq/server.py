@@ -10,7 +10,6 @@ import http.server
 import ipaddress
 import json
 import socket
-import sys
 import threading
 import time
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 
 from drivers.camera import Camera, FocusSetting
 from drivers.errors import DeviceError
+from sim.peers.http import DroppableServer
 from sim.peers.robotiq.settings import Settings
 
 
@@ -104,8 +104,7 @@ class RobotiqPeer:
 
     def close(self) -> None:
         """Stop listening and cut the connections."""
-        self._server.shutdown()
-        self._server.server_close()
+        self._server.end()
 
     def __enter__(self) -> RobotiqPeer:
         return self.start()
@@ -167,14 +166,8 @@ def _focus_of(settings: Settings) -> dict[str, Any]:
     return {name: value for name, value in settings.values.items() if name.startswith("focus")}
 
 
-class _Server(http.server.ThreadingHTTPServer):
-    daemon_threads = True
+class _Server(DroppableServer):
     peer: RobotiqPeer
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A client that goes away in the middle of an answer is no error of the server's."""
-        if not isinstance(sys.exception(), ConnectionError):
-            super().handle_error(request, client_address)
 
 
 class _Handler(http.server.BaseHTTPRequestHandler):

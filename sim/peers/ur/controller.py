@@ -120,6 +120,8 @@ class URController:
         self._ports: list[Listener] = []
 
     def __enter__(self) -> URController:
+        self._stopping.clear()
+        self._ports.clear()
         self.arm.connect()
         self._rtde = RtdeServer(self)
         servers = {
@@ -171,6 +173,18 @@ class URController:
         for port in self._ports:
             port.close()
         self.halt("controller killed")
+
+    def wait_out_protective_stop(self) -> None:
+        """The five seconds pass after which a protective stop may be unlocked."""
+        self._protective_stop_s -= UNLOCK_WAIT_S
+
+    def restore(self) -> None:
+        """Cable in, button released, arm powered, in remote control, no program loaded."""
+        with self._lock:
+            self.stop_program("restored")
+            self.mute = self.deaf = False
+            self.remote_control = True
+            self.safety, self.robot_mode = Safety.NORMAL, Robot.RUNNING
 
     # ---- what its ports order ----------------------------------------------------------------
 

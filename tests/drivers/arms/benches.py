@@ -217,3 +217,13 @@ def ur_moving(**settings: Any) -> Iterator[tuple[URArm, URController, SimArm]]:
 
 def at_speed(joints_rad: tuple[float, ...], tcp_speed_m_s: float) -> MoveTarget:
     return MoveTarget(joints_rad=joints_rad, joint_speed_rad_s=1.0, tcp_speed_m_s=tcp_speed_m_s)
+
+
+def best_of_three(measure: Callable[[], float], goal_s: float) -> None:
+    """A latency that a busy machine may spoil twice."""
+    latencies_s = []
+    for _ in range(3):
+        latencies_s.append(measure())
+        if latencies_s[-1] < goal_s:
+            return
+    raise AssertionError(latencies_s)

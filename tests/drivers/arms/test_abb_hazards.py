@@ -1,16 +1,20 @@
 """What an IRC5, its library and the network can do to a run, and that the arm stops."""
 
 import random
+import re
+import signal
 import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 from benches import (
     ABB_HOME,
     abb_peer,
+    best_of_three,
     free_udp_port,
     halted_s,
     quickly,
@@ -24,7 +28,7 @@ from benches import (
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.chain.kinematics import arm as kinematics_of
-from drivers.abb import ABBArm, ABBSettings
+from drivers.abb import ABBArm, ABBSettings, link_watch
 from drivers.abb.program import build_program
 from drivers.abb.readings import Reading
 from drivers.arm import Motion, MoveTarget
@@ -32,6 +36,7 @@ from drivers.errors import ArmStopped, DeviceError, DeviceRefused, DeviceUnreach
 from sim.peers.abb.motion_program import decode
 
 GOAL_S = 0.1
+LINK_WATCH_S = ABBSettings().link_watch_s
 FAR = tuple(angle + 0.6 for angle in ABB_HOME)
 MOUNTED = RigidTransform.from_components([0.5, -0.2, 1.0], Rotation.from_rotvec([0, 0.3, 1.2]))
 
@@ -60,18 +65,17 @@ def moving(egm=False, **settings):
 
 
 def test_a_stop_reaches_the_arm_within_100_ms_after_the_connections_were_dropped():
-    latencies_s = []
-    for _ in range(3):
+    def measure():
         with moving() as (arm, controller, sim):
             controller.drop()
             since_s = time.monotonic()
             arm.stop()
-            latencies_s.append(halted_s(controller, since_s))
-            assert until(lambda sim=sim: not truly_moving(sim))
+            latency_s = halted_s(controller, since_s)
+            assert until(lambda: not truly_moving(sim))
             assert stays(sim, 0.2)
-        if latencies_s[-1] < GOAL_S:
-            return
-    raise AssertionError(latencies_s)
+            return latency_s
+
+    best_of_three(measure, GOAL_S)
 
 
 def test_dropped_connections_are_made_again_and_the_move_ends_at_its_target():
@@ -106,22 +110,27 @@ time.sleep(60)
 """
 
 
+@contextmanager
+def process_moving():
+    with abb_peer() as (controller, sim):
+        command = [sys.executable, "-c", _MOVE_AND_WAIT, controller.url, *map(str, FAR)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+            assert process.stdout.readline() == b"moving\n"
+            assert until(lambda: truly_moving(sim))
+            yield process, controller, sim
+
+
 def test_the_arm_stops_when_our_process_is_killed_on_the_way():
-    latencies_s = []
-    for _ in range(3):
-        with abb_peer() as (controller, sim):
-            command = [sys.executable, "-c", _MOVE_AND_WAIT, controller.url, *map(str, FAR)]
-            with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
-                assert process.stdout.readline() == b"moving\n"
-                assert until(lambda sim=sim: truly_moving(sim))
-                since_s = time.monotonic()
-                process.kill()
-            latencies_s.append(halted_s(controller, since_s))
-            assert until(lambda sim=sim: not truly_moving(sim))
+    def measure():
+        with process_moving() as (process, controller, sim):
+            since_s = time.monotonic()
+            process.kill()
+            latency_s = halted_s(controller, since_s)
+            assert until(lambda: not truly_moving(sim))
             assert stays(sim)
-        if latencies_s[-1] < GOAL_S:
-            return
-    raise AssertionError(latencies_s)
+            return latency_s
+
+    best_of_three(measure, GOAL_S)
 
 
 def test_a_controller_that_falls_silent_holds_nobody_up_and_is_told():
@@ -155,6 +164,72 @@ def test_a_dead_controller_fails_the_stop_loudly_and_at_once():
             arm.stop()
         assert time.monotonic() - begin_s < 0.1
         assert until(lambda: unreachable(arm), 3.0)
+
+
+def test_a_cut_cable_stops_the_motion_under_way():
+    def measure():
+        with moving() as (_, controller, sim):
+            since_s = time.monotonic()
+            controller.faults.mute = True
+            latency_s = halted_s(controller, since_s)
+            assert until(lambda: not truly_moving(sim))
+            assert stays(sim)
+            controller.faults.mute = False
+            return latency_s
+
+    best_of_three(measure, LINK_WATCH_S + GOAL_S)
+
+
+def test_a_cut_cable_that_nobody_watches_stops_nothing():
+    # the hazard itself, so that the test above means something
+    with moving(link_watch_s=None) as (_, controller, sim):
+        controller.faults.mute = True
+        assert not until(lambda: not truly_moving(sim), 2 * LINK_WATCH_S)
+        controller.faults.mute = False
+
+
+def test_the_arm_stops_when_our_process_hangs_on_the_way():
+    def measure():
+        with process_moving() as (process, controller, sim):
+            since_s = time.monotonic()
+            process.send_signal(signal.SIGSTOP)
+            latency_s = halted_s(controller, since_s)
+            process.kill()
+            assert until(lambda: not truly_moving(sim))
+            assert stays(sim)
+            return latency_s
+
+    best_of_three(measure, LINK_WATCH_S + GOAL_S)
+
+
+def test_a_motion_that_the_controller_stopped_for_silence_is_told_as_such():
+    with moving() as (arm, controller, _):
+        controller.faults.mute = True
+        assert until(lambda: controller.watch.values["stops"] == 1)
+        controller.faults.mute = False
+        assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT, 3.0)
+        assert "heard nothing" in arm.state().fault
+        assert "check the cable" in arm.state().fault
+
+
+@pytest.mark.parametrize(("part", "words"), [("loaded", "cell_watch.mod"), ("running", "start it")])
+def test_nothing_moves_where_the_controller_does_not_watch_the_link(part, words):
+    with abb_peer() as (controller, _):
+        setattr(controller.watch, part, False)
+        with pytest.raises(DeviceRefused, match=words):
+            ABBArm(controller.url).connect()
+        ABBArm(controller.url, ABBSettings(link_watch_s=None)).connect()
+
+
+def test_nobody_is_watched_while_the_arm_stands():
+    with connected() as (arm, controller, _):
+        arm.start_move(quickly(tuple(angle + 0.05 for angle in ABB_HOME)))
+        wait_steady(arm)
+        assert until(lambda: controller.watch.values["beat"] == 0)
+        controller.faults.mute = True
+        time.sleep(1.5 * LINK_WATCH_S)
+        assert controller.watch.values["stops"] == 0
+        controller.faults.mute = False
 
 
 def test_a_refused_stop_switches_the_motors_off():
@@ -281,3 +356,18 @@ def test_moving_again_after_a_guard_stop_needs_a_new_connection():
         arm.connect()
         arm.start_move(quickly(ABB_HOME))
         assert wait_steady(arm).joints_rad == pytest.approx(ABB_HOME, abs=1e-5)
+
+
+def test_the_module_for_the_controller_has_what_the_driver_and_the_peer_speak_of():
+    folder = Path(link_watch.__file__).parent / "rapid"
+    module = (folder / "cell_watch.mod").read_text()
+    configuration = (folder / "cell_watch.cfg").read_text()
+    with abb_peer() as (controller, _):
+        names = {f"{link_watch.MODULE}_{name}" for name in controller.watch.values}
+        limit = controller.watch.values["limit"]
+    assert set(re.findall(r"PERS num (\w+)", module)) == names
+    assert f"MODULE {link_watch.MODULE}\n" in module
+    assert f"cell_watch_limit := {limit:g};" in module
+    assert f'-Name "{link_watch.TASK}"' in configuration
+    entry = re.search(r"PROC (\w+)", module)[1]
+    assert f'-Entry "{entry}"' in configuration

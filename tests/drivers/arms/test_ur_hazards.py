@@ -19,6 +19,7 @@ import pytest
 from benches import (
     UR_FAR,
     UR_HOME,
+    best_of_three,
     halted_s,
     quickly,
     slowly,
@@ -38,15 +39,6 @@ from sim.peers.ur import Runtime
 
 GOAL_S = 0.1
 WATCHDOG_S = 0.25
-
-
-def best_of_three(measure, goal_s):
-    latencies_s = []
-    for _ in range(3):
-        latencies_s.append(measure())
-        if latencies_s[-1] < goal_s:
-            return
-    raise AssertionError(latencies_s)
 
 
 def drop(controller, arm):
@@ -261,7 +253,7 @@ def test_a_protective_stop_ends_the_program_so_that_unlocking_does_not_drive_on(
         assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT)
         assert "protective stop" in arm.state().fault
         assert until(lambda: controller.runtime is Runtime.STOPPED and not truly_moving(sim))
-        controller._protective_stop_s -= 5.0
+        controller.wait_out_protective_stop()
         assert controller.unlock_protective_stop()
         controller.play()
         assert stays(sim)
@@ -275,7 +267,7 @@ def test_a_protective_stop_left_paused_would_have_driven_on():
         arm._supervisor._closing.set()
         arm._supervisor._thread.join()
         controller.protective_stop()
-        controller._protective_stop_s -= 5.0
+        controller.wait_out_protective_stop()
         assert controller.unlock_protective_stop()
         assert until(lambda: not truly_moving(sim))
         assert controller.play()
@@ -288,7 +280,7 @@ def test_recovering_from_a_protective_stop_obeys_the_five_second_rule():
         assert until(lambda: arm.state().fault is not None)
         with pytest.raises(DeviceRefused, match="5s"):
             arm.recover()
-        controller._protective_stop_s -= 5.0
+        controller.wait_out_protective_stop()
         arm.recover()
         assert stays(sim)
         assert arm.state().fault is None

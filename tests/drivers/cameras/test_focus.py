@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 
 from drivers.camera import FocusSetting
-from drivers.errors import DeviceError, DeviceRefused
+from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable
 from drivers.focus import FocusControl, FocusNames
 
 BASLER = FocusNames(controller="Optic1")
@@ -109,6 +111,15 @@ def test_a_lens_that_never_gets_ready_is_an_error() -> None:
     lens.busy_for = 10**9
     with pytest.raises(DeviceError, match=r"not ready after 0.1 s"):
         FocusControl(lens, FocusNames(), 0.1).set(FocusSetting("position", 55.0))
+
+
+def test_a_camera_that_was_off_meanwhile_is_lost_and_not_waited_for() -> None:
+    lens = sfnc_lens()
+    lens.busy_for = 10**9
+    control = FocusControl(lens, FocusNames(), 60.0)
+    threading.Timer(0.2, lens.values.update, ({"FocusStatus": "NotInitialized"},)).start()
+    with pytest.raises(DeviceUnreachable, match="lost its reference"):
+        control.set(FocusSetting("position", 55.0))
 
 
 def test_a_lens_error_is_refused_in_words() -> None:

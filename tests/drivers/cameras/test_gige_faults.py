@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -255,6 +256,16 @@ def test_a_camera_that_a_crashed_program_held_is_waited_for(peer: GigEPeer) -> N
     camera.connect()
     assert camera.grab(5.0).image.size
     camera.close()
+
+
+def test_a_camera_left_acquiring_by_a_crashed_program_is_set_up_anew(
+    camera: AravisCamera, peer: GigEPeer, scene: Scene
+) -> None:
+    assert peer.streamer.acquiring
+    peer.control.release()
+    with closing(AravisCamera(peer.address, GenICamOptions(exposure_s=0.004))) as second:
+        second.connect()
+        assert frames_right(second, scene, 2) == [True] * 2
 
 
 def test_every_automatism_is_off_after_connecting(camera: AravisCamera, peer: GigEPeer) -> None:

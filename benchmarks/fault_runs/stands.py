@@ -1,0 +1,160 @@
+"""A small real cell, its peers and its plan: what `cell run` drives here, without --dry-run.
+
+The devices live in this process, so that faults are ordered and the arm's truth is read directly;
+the cell runs in a process of its own and knows nothing but their addresses.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cell.files.plan_file import Plan, read_plan
+from cell.files.yaml_model import read_mapping
+from cell.simulated import home_of, simulated_cell
+from sim.arm import SimArm
+from sim.build import build
+from sim.camera import SimCamera
+from sim.cell import SimulatedCell
+from sim.clock import SimClock, WallClock
+from sim.peers.abb import ABBController
+from sim.peers.gige import GigEPeer
+from sim.peers.robotiq import RobotiqPeer
+from sim.peers.ur import URController
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+VIEWS = 60
+_WIDTH_PX = 320
+_SWAY_DEG = np.array([1.0, 1.0, -1.0, 1.5, 1.5, 10.0])
+_numbers = itertools.count(2)
+
+
+@dataclass
+class Stand:
+    """The devices of one real cell.
+
+    Attributes
+    ----------
+    plan:
+        Of `VIEWS` views around the cell's home, each a move of about half a second.
+    truth, sim:
+        What the peers simulate, and the arm behind the controller.
+    arm, camera:
+        The peers.
+    """
+
+    plan: Plan
+    truth: SimulatedCell
+    sim: SimArm
+    arm: Any
+    camera: Any
+
+    def truly_moving(self) -> bool:
+        """Whether any joint moves, whoever says what."""
+        return bool(np.abs(self.sim.truth().joint_velocity_rad_s).max() > 0.0)
+
+
+@contextmanager
+def ur_gige(folder: Path) -> Iterator[Stand]:
+    """A UR3 and a GigE Vision camera."""
+    arm_at, camera_at = _address(), _address()
+    robot = {"driver": "ur", "address": arm_at}
+    camera = {"driver": "gige", "model": "gige_camera", "address": camera_at}
+    plan = _plan(folder, "ur3-robotiq", robot, camera)
+    with ExitStack() as stack:
+        truth, sim, source = _built(plan)
+        controller = stack.enter_context(URController(sim, arm_at, kinematics=truth.kinematics))
+        spec = truth.camera
+        peer = GigEPeer(
+            source,
+            spec.width_px,
+            spec.height_px,
+            address=camera_at,
+            focus_steps=spec.focus_steps,
+        )
+        yield Stand(plan, truth, sim, controller, stack.enter_context(peer))
+
+
+@contextmanager
+def abb_robotiq(folder: Path) -> Iterator[Stand]:
+    """An IRB 140 and a Robotiq wrist camera."""
+    arm_at, camera_at = _address(), f"{_address()}:4242"
+    robot = {"driver": "abb", "address": f"{arm_at}:8610"}
+    camera = {"driver": "robotiq", "model": "robotiq_wrist", "address": camera_at}
+    plan = _plan(folder, "irb140-eosens", robot, camera)
+    with ExitStack() as stack:
+        truth, sim, source = _built(plan)
+        controller = stack.enter_context(ABBController(sim, arm_at))
+        host, _, port = camera_at.partition(":")
+        peer = RobotiqPeer(source, address=host, port=int(port))
+        yield Stand(plan, truth, sim, controller, stack.enter_context(peer))
+
+
+STANDS = {"ur+gige": ur_gige, "abb+robotiq": abb_robotiq}
+
+
+def _address() -> str:
+    """A loopback address that no other process and no other stand has."""
+    pid = os.getpid()
+    return f"127.{128 + (pid >> 14) % 64}.{(pid >> 7) & 127}.{(pid & 127) + next(_numbers)}"
+
+
+def _plan(folder: Path, name: str, robot: dict[str, Any], camera: dict[str, Any]) -> Plan:
+    cell = json.loads(json.dumps(read_mapping(CONFIGS / f"{name}.cell.yaml")))
+    cell["robot"] |= robot
+    cell["camera"] |= camera
+    _shrink(cell)
+    (folder / "cell.yaml").write_text(json.dumps(cell))
+    home = np.array(cell["layout"]["home_deg"], float)
+    views = [{"joints_deg": (home + _sway(number)).round(4).tolist()} for number in range(VIEWS)]
+    plan = {
+        "schema": "cell.plan/1",
+        "name": "faults",
+        "cell": "cell.yaml",
+        "speed_m_s": 0.25,
+        "exposure": {"focus": "auto", "timeout_s": 2.0},
+        "views": views,
+    }
+    (folder / "plan.yaml").write_text(json.dumps(plan))
+    return read_plan(folder / "plan.yaml")
+
+
+def _sway(number: int) -> Any:
+    """Offsets that no two neighbours share, so that each view is a move."""
+    return _SWAY_DEG * np.sin(np.arange(1, 7) * (1.0 + 2.0 * number))
+
+
+def _shrink(cell: dict[str, Any]) -> None:
+    """Fewer pixels of the same field of view, which render at once; no lens that breathes."""
+    scale = _WIDTH_PX / cell["camera"]["width"]
+    cell["camera"] |= {"width": _WIDTH_PX, "height": round(cell["camera"]["height"] * scale)}
+    cell["camera"].pop("pixel_size_um", None)
+    optics = cell["simulation"]["optics"]
+    for name in ("alpha_px", "beta_px", "u0_px", "v0_px"):
+        optics[name] = (
+            (optics[name] + 0.5) * scale - 0.5 if name[1] == "0" else optics[name] * scale
+        )
+    cell["layout"]["alpha_px"] *= scale
+    cell["simulation"]["effects"] = []
+
+
+def _built(plan: Plan) -> tuple[SimulatedCell, SimArm, SimCamera]:
+    truth = simulated_cell(plan.cell, home_of(plan))
+    _compile(truth)
+    return truth, *build(truth, WallClock())
+
+
+def _compile(truth: SimulatedCell) -> None:
+    """Take a picture in a throw-away cell, so that the first real one is not late."""
+    arm, camera = build(truth, SimClock())
+    arm.connect()
+    camera.connect()
+    camera.grab(1.0)
