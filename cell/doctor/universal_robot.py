@@ -15,6 +15,7 @@ from drivers.ur.reader import Packet, RtdeReader
 
 _PORTS = {29999: "dashboard", 30003: "script", 30004: "RTDE"}
 _LISTEN_S = 1.0
+_SILENCE_S = 1.0  # nothing moves here, so a busy computer may miss a few packets
 _LONGEST_TOOL_M = 1.0
 _CLOCK_SLIP_S = 0.02
 
@@ -60,7 +61,7 @@ def _state(address: str) -> list[Finding]:
 
 
 def _packets(address: str) -> list[Finding]:
-    reader = RtdeReader(address)
+    reader = RtdeReader(address, silence_s=_SILENCE_S)
     try:
         reader.connect()
         heard = _listen(reader)
