@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform
 from calib.views import Views
 from cell.errors import BadAnswer, InputError
 from cell.factory import simulated_devices
-from cell.files.cell_file import EffectFile
+from cell.files.cell_file import EffectFile, Simulation
 from cell.files.plan_file import Plan
 from cell.log_slips import SLIPS, slip
 from cell.recording import Corners, FrameRecord, PoseRecord, RecordingWriter, write_corners
@@ -45,8 +45,7 @@ def simulate_corners(plan: Plan, folder: Path, seed: int | None = None) -> int:
     InputError
         The cell has no truth to simulate, or a recording is in the way.
     """
-    cell = simulated_cell(plan.cell, home_of(plan), seed=seed)
-    views = _with_slips(plan, cell, synthesize(cell, log_of(plan, cell)))
+    views = simulated_views(plan, simulated_cell(plan.cell, home_of(plan), seed=seed))
     header = header_of(plan, simulated=True, images=False)
     header = header.model_copy(
         update={"robot": header.robot.model_copy(update={"model": views.robot_model})}
@@ -75,7 +74,9 @@ def simulate_pictures(plan: Plan, folder: Path, seed: int | None = None) -> int:
     return result.frames
 
 
-def _with_slips(plan: Plan, cell: SimulatedCell, views: Views) -> Views:
+def simulated_views(plan: Plan, cell: SimulatedCell) -> Views:
+    """What the plan's simulated cell would record, without a file; raises `InputError`."""
+    views = synthesize(cell, log_of(plan, cell))
     effects = plan.cell.simulation.effects if plan.cell.simulation else ()
     rng = cell.random(_SLIP_STREAM)
     for effect in effects:
@@ -112,9 +113,13 @@ def with_effects(plan: Plan, effects: tuple[str, ...]) -> Plan:
     parsed = tuple(parse_effect(text) for text in effects)
     for effect in parsed:
         if effect.name not in SLIPS:
-            present_effect(plan.cell, effect)
-    cell = plan.cell.model_copy(update={"simulation": truth.model_copy(update={"effects": parsed})})
-    return replace(plan, cell=cell)
+            present_effect(effect, "--effect")
+    return with_truth(plan, truth.model_copy(update={"effects": parsed}))
+
+
+def with_truth(plan: Plan, truth: Simulation) -> Plan:
+    """The plan with another truth in its cell."""
+    return replace(plan, cell=plan.cell.model_copy(update={"simulation": truth}))
 
 
 def parse_effect(text: str) -> EffectFile:

@@ -67,13 +67,16 @@ def simulated_cell(
     )
 
 
-def present_effect(cell: CellFile, effect: EffectFile) -> Present:
-    """An effect of the catalogue with its values; raises `InputError` for one it does not have."""
+def present_effect(effect: EffectFile, where: str) -> Present:
+    """An effect of the catalogue with its values; raises `InputError` for one it does not have.
+
+    `where` is the place in a file that the error tells.
+    """
     law = {} if effect.law is None else {"law": effect.law}
     try:
         return make_effect(effect.name, {**effect.parameters, **law})
     except KeyError as unknown:
-        raise InputError(f"cell {cell.name}: simulation.effects: {unknown.args[0]}") from None
+        raise InputError(f"{where}: {unknown.args[0]}") from None
 
 
 def _model(cell: CellFile, truth: Simulation) -> CellModel:
@@ -83,12 +86,13 @@ def _model(cell: CellFile, truth: Simulation) -> CellModel:
             f"cell {cell.name}: simulation.optics: {', '.join(unknown)} is not known; known are"
             f" {', '.join(OPTICS)}"
         )
+    where = f"cell {cell.name}: simulation.effects"
     return CellModel(
         optics=optics_row(**{"height_px": cell.camera.height, **truth.optics}),
         flange_from_mounted=truth.mounted.transform().as_matrix(),
         base_from_fixed=truth.fixed.transform().as_matrix(),
         effects=tuple(
-            present_effect(cell, effect) for effect in truth.effects if effect.name not in SLIPS
+            present_effect(effect, where) for effect in truth.effects if effect.name not in SLIPS
         ),
     )
 

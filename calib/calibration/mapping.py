@@ -29,10 +29,11 @@ ROBOT_IN_IT = ("fixed_alpha_algebraic", "fixed_alpha_mle", "joint_ml")
 """Solutions made with the robot's distances: their error along the axis against that same robot
 is small by construction, and proves nothing by itself."""
 
-_TRANSFORMS = {
+TRANSFORMS = {
     "eye_in_hand": ("flange_from_camera", "base_from_board"),
     "eye_to_hand": ("flange_from_board", "base_from_camera"),
 }
+"""What the chain's `flange_from_mounted` and `base_from_fixed` are called in the file."""
 
 
 def as_mapping(calibration: Calibration, recording: str) -> dict[str, Any]:
@@ -137,7 +138,7 @@ def _covariance(calibration: Calibration, found: Covariance | None) -> dict[str,
     if found is None:
         return None
     mount = "eye_in_hand" if calibration.robot is None else calibration.robot.mount
-    frames = dict(zip(("flange_from_mounted", "base_from_fixed"), _TRANSFORMS[mount], strict=True))
+    frames = dict(zip(("flange_from_mounted", "base_from_fixed"), TRANSFORMS[mount], strict=True))
     names = []
     for name in found.names:
         frame, _, axis = name.partition(".")
@@ -164,9 +165,9 @@ def _consistency(error: PositionError) -> dict[str, float] | None:
 
 
 def _transforms(robot: RobotReference | None) -> dict[str, Any]:
-    out: dict[str, Any] = {name: None for pair in _TRANSFORMS.values() for name in pair}
+    out: dict[str, Any] = {name: None for pair in TRANSFORMS.values() for name in pair}
     if robot is not None:
-        mounted, fixed = _TRANSFORMS[robot.mount]
+        mounted, fixed = TRANSFORMS[robot.mount]
         sigma = np.sqrt(np.maximum(np.diag(robot.covariance), 0.0))
         out[mounted] = _transform(robot.flange_from_mounted, sigma[:6])
         out[fixed] = _transform(robot.base_from_fixed, sigma[6:])

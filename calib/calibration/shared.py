@@ -7,10 +7,11 @@ from calib.chain.optics import COLUMN
 from calib.paper.focus_law import Parameter
 from calib.solver.joint import JointFit
 
-_FAR_NAMES = {
+FAR_NAMES = {
     "inverse_square": {"alpha_px": "alpha0_px", "beta_px": "beta0_px"},
     "thin_lens": {"alpha_px": "alpha_inf_px", "beta_px": "beta_inf_px"},
 }
+"""What alpha and beta far away are called among a focus law's numbers."""
 
 
 def joint_covariance(joint: JointFit, law: str | None) -> Covariance:
@@ -24,7 +25,7 @@ def joint_covariance(joint: JointFit, law: str | None) -> Covariance:
 def _name(unknown: str, law: str | None) -> str:
     if unknown.startswith("focus_breathing"):
         return unknown.rpartition(".")[2]
-    return _FAR_NAMES.get(law or "", {}).get(unknown, unknown)
+    return FAR_NAMES.get(law or "", {}).get(unknown, unknown)
 
 
 def joint_focus(joint: JointFit, law: str | None) -> Focus | None:
@@ -33,7 +34,7 @@ def joint_focus(joint: JointFit, law: str | None) -> Focus | None:
         return None
     parameters = {
         far: Parameter(float(joint.model.optics[COLUMN[plain]]), joint.sigma(plain), "px")
-        for plain, far in _FAR_NAMES[law].items()
+        for plain, far in FAR_NAMES[law].items()
     }
     (breathing,) = (e for e in joint.model.effects if e.effect.name == "focus_breathing")
     (bend,) = breathing.effect.parameters

@@ -20,6 +20,7 @@ from cell.cli.output import say_error
 from cell.cli.plan import plan
 from cell.cli.run import run
 from cell.cli.simulate import simulate
+from cell.cli.study import study
 from cell.cli.verify import verify
 from cell.errors import EXIT_OPERATOR, exit_status_of
 
@@ -40,6 +41,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "verify": verify,
     "export": export,
     "import": import_,
+    "study": study,
     "doctor": doctor,
 }
 for name, verb in VERBS.items():

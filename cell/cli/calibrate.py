@@ -19,12 +19,12 @@ def calibrate(
 ) -> None:
     """Calibrate a recording; writes calibration.json and report.html."""
     from cell.calibrate import calibrate_into
-    from cell.cli.progress import picture_progress
+    from cell.cli.progress import counted_progress
     from cell.cli.summary import calibration_summary
     from cell.recording import read_recording
 
     source = read_recording(recording)
-    with picture_progress() as progress:
+    with counted_progress("finding corners") as progress:
         calibrated, folder = calibrate_into(
             source, output, progress=progress, simulated=source.header.simulated
         )

@@ -24,14 +24,14 @@ def diagnose(
     as_json: JsonFlag = False,
 ) -> None:
     """Diagnose a recording; writes diagnosis.json, twin.yaml and report.html."""
-    from cell.cli.progress import picture_progress
+    from cell.cli.progress import counted_progress
     from cell.cli.summary import diagnosis_summary
     from cell.diagnose import diagnose_into
     from cell.recording import read_recording
 
     source = read_recording(recording)
     names = None if effects is None else [name for name in effects.split(",") if name]
-    with picture_progress() as progress:
+    with counted_progress("finding corners") as progress:
         diagnosed = diagnose_into(
             source,
             output,

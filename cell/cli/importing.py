@@ -40,7 +40,7 @@ def import_(
     as_json: JsonFlag = False,
 ) -> None:
     """Turn images and poses of another tool's layout into a recording, corners found."""
-    from cell.cli.progress import picture_progress
+    from cell.cli.progress import counted_progress
     from cell.importing.importer import Described, import_source
 
     described = Described(
@@ -53,7 +53,7 @@ def import_(
         robot=robot,
     )
     folder = output or new_folder(f"{source.resolve().name}-imported")
-    with picture_progress() as progress:
+    with counted_progress("finding corners") as progress:
         imported = import_source(source, folder, described, progress)
     for guess in imported.guessed:
         say(f"GUESSED: {guess}")

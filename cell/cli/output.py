@@ -33,5 +33,10 @@ def say_error(text: str) -> None:
 
 def new_folder(name: str) -> Path:
     """A folder under `runs/` for results whose place was not given."""
-    words = "".join(c if c.isalnum() or c in "-_" else "-" for c in name).strip("-")
-    return Path("runs") / f"{words}-{time.strftime('%Y%m%d-%H%M%S')}"
+    same = same_folder(name)
+    return same.with_name(f"{same.name}-{time.strftime('%Y%m%d-%H%M%S')}")
+
+
+def same_folder(name: str) -> Path:
+    """The folder under `runs/` of what goes on where it was left."""
+    return Path("runs") / "".join(c if c.isalnum() or c in "-_" else "-" for c in name).strip("-")

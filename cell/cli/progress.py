@@ -62,11 +62,11 @@ def _clock(seconds: float | None) -> str:
 
 
 @contextmanager
-def picture_progress() -> Iterator[Callable[[int, int], None]]:
-    """Told (done, total) while pictures are searched for the board."""
+def counted_progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Told (done, total) of what is being done; silent where nobody looks."""
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal) as bar:
-        task = bar.add_task("finding corners", total=None)
+        task = bar.add_task(what, total=None)
 
         def tell(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)

@@ -12,6 +12,8 @@ import calib
 from cell.doctor.finding import Finding
 from cell.files.camera_file import GigeCamera
 from cell.files.cell_file import CellFile
+from cell.study.extra import MEND as STUDY_MEND
+from cell.study.extra import PACKAGES as STUDY_PACKAGES
 from drivers.aravis_network import receive_buffer_hint, receive_buffer_limit_bytes
 
 _ALWAYS = (
@@ -38,7 +40,8 @@ def installed(cell: CellFile | None) -> list[Finding]:
     """Packages and limits; those that only other cells need are told and do not block."""
     python = Finding("Python", True, platform.python_version())
     needed = [_package(name, "pip install calibration-cell") for name in _ALWAYS]
-    return [python, *needed, _compiled(), *_drivers(cell), *_gige(cell)]
+    studies = [_package(name, STUDY_MEND, needed=False) for name in STUDY_PACKAGES]
+    return [python, *needed, _compiled(), *_drivers(cell), *_gige(cell), *studies]
 
 
 def _compiled() -> Finding:

@@ -14,6 +14,7 @@ from cell.files.calibration_file import CalibrationFile
 from cell.files.cell_file import CellFile
 from cell.files.diagnosis_file import DiagnosisFile
 from cell.files.plan_file import PlanFile
+from cell.files.study_file import StudyFile
 from cell.files.verify_file import VerifyFile
 
 FOLDER = Path(__file__).parents[1] / "schemas"
@@ -22,6 +23,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "cell.schema.json": CellFile,
     "diagnosis.schema.json": DiagnosisFile,
     "plan.schema.json": PlanFile,
+    "study.schema.json": StudyFile,
     "verify.schema.json": VerifyFile,
 }
 

@@ -114,7 +114,7 @@ def _placed_error(
     path: Path, data: CommentedMap, error: ErrorDetails, known: list[str]
 ) -> tuple[tuple[int, int], str]:
     """Where an error stands, and its line for the operator."""
-    location = _real_location(data, error["loc"])
+    location = _real_location(data, error["loc"], missing=error["type"] == "missing")
     line, column = position_of(data, location)
     name = ".".join(str(part) for part in location) or "(whole file)"
     return (line, column), f"{path}:{line}:{column}: {name}: {_message(error, known)}"
@@ -134,14 +134,17 @@ def _message(error: ErrorDetails, known: list[str]) -> str:
     return f"{text} (got {shown if len(shown) <= 60 else shown[:57] + '...'})"
 
 
-def _real_location(data: Any, location: Location) -> Location:
-    """Pydantic's location without the tags it puts in for the members of a union."""
+def _real_location(data: Any, location: Location, *, missing: bool) -> Location:
+    """Pydantic's location without the tags it puts in for the members of a union.
+
+    Only a key that is missing (the last part) is not in the data either.
+    """
     real: list[int | str] = []
     for depth, part in enumerate(location):
         inside = _has(data, part)
         if inside:
             data = data[part]
-        if inside or (depth == len(location) - 1 and isinstance(data, Mapping)):
+        if inside or (missing and depth == len(location) - 1):
             real.append(part)
     return tuple(real)
 

@@ -144,7 +144,7 @@ def plan_power(model: CellModel, views: Views, noise: Noise) -> Power:
     """
     taken = {p.effect.label for p in model.effects}
     effects = [
-        Present(effect, _shaped(effect, views))
+        Present(effect, usual_shape(effect, views))
         for effect in catalogue()
         if effect.missing(views) is None and effect.label not in taken
     ]
@@ -163,8 +163,11 @@ def plan_power(model: CellModel, views: Views, noise: Noise) -> Power:
     return Power(told, unseen(views), noise, frames)
 
 
-def _shaped(effect: Effect, views: Views) -> FloatArray:
-    """Amounts zero; shapes usual where they are among those worth trying, else the middle one."""
+def usual_shape(effect: Effect, views: Views) -> FloatArray:
+    """(P,) amounts zero; shapes usual where those are worth trying on such a log, else the middle.
+
+    A thing that slips before the first frame, for one, has not slipped.
+    """
     usual = effect.values({})
     tried = [effect.values(shape) for shape in effect.candidates(views)]
     if not tried or any(np.array_equal(values, usual) for values in tried):

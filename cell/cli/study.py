@@ -1,0 +1,82 @@
+"""`cell study`: many simulated runs or many recordings, on all cores or on a cluster."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cell.cli.output import JsonFlag, same_folder, show
+from cell.errors import EXIT_BAD_ANSWER
+
+if TYPE_CHECKING:
+    from cell.study.run import Outcome
+
+_REASONS = 5
+
+
+def study(
+    study: Annotated[Path, typer.Argument(help="A study file.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder of its results; runs/NAME where not given."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", help="Address of a Dask scheduler; this machine's cores else."),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", min=1, help="Processes on this machine; one a core else."),
+    ] = None,
+    as_json: JsonFlag = False,
+) -> None:
+    """Run a study, or the rest of one: results of tasks that are done stay as they are."""
+    from cell.study.extra import require_extra
+
+    require_extra()
+    from cell.cli.progress import counted_progress
+    from cell.files.study_file import read_study
+    from cell.sequencer.stop import StopRequest, signals_ask
+    from cell.study.run import run_study
+
+    read, stop = read_study(study), StopRequest()
+    folder = output or same_folder(read.file.name)
+    with signals_ask(stop), counted_progress("tasks") as listener:
+        outcome = run_study(
+            read, folder, scheduler=scheduler, workers=workers, stop=stop, listener=listener
+        )
+    if as_json:
+        show("", _mapping(outcome), as_json=True)
+    else:
+        _print(outcome)
+    if outcome.failed:
+        raise typer.Exit(EXIT_BAD_ANSWER)
+
+
+def _mapping(outcome: Outcome) -> dict[str, Any]:
+    failed = [{"key": row["key"], "reason": row["reason"]} for row in outcome.failed]
+    return {
+        "folder": str(outcome.folder),
+        "results": str(outcome.results),
+        "tasks": len(outcome.rows),
+        "failed": failed,
+        **outcome.summary,
+    }
+
+
+def _print(outcome: Outcome) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    for table in outcome.tables():
+        console.print(table)
+    failed = outcome.failed
+    for row in failed[:_REASONS]:
+        console.print(f"failed: {row['key']}: {row['reason']}", markup=False)
+    if len(failed) > _REASONS:
+        console.print(f"and {len(failed) - _REASONS} more that failed")
+    console.print(
+        f"{len(outcome.rows)} tasks, {len(failed)} failed: {outcome.results}", soft_wrap=True
+    )

@@ -1,0 +1,105 @@
+"""The workers: processes on this machine's cores, or those of a scheduler by its address."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import dask
+from distributed import Client, LocalCluster
+
+from cell.study.work import ready
+from drivers.errors import DeviceUnreachable
+
+logging.getLogger("distributed").setLevel(logging.ERROR)
+
+REACH_S = 10.0
+_WORKER_S = 60.0
+_ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+
+@contextmanager
+def workers_of(scheduler: str | None, count: int | None = None) -> Iterator[Client]:
+    """A client whose workers can do tasks.
+
+    Parameters
+    ----------
+    scheduler:
+        Its address, such as ``tcp://10.0.0.5:8786``; None for processes on this machine.
+    count:
+        How many of those; as many as this process may use cores where None.
+
+    Raises
+    ------
+    DeviceUnreachable
+        No scheduler is there, it has no workers, or they cannot do this program's work.
+    """
+    if scheduler is None:
+        with _local(count) as cluster, Client(cluster, set_as_default=False) as client:
+            yield client
+        return
+    try:
+        client = Client(scheduler, timeout=REACH_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise DeviceUnreachable(
+            f"--scheduler {scheduler}: no Dask scheduler answers there ({error}). Is `dask"
+            " scheduler` running, and is this its address?"
+        ) from None
+    with client:
+        _check(client, scheduler)
+        yield client
+
+
+@contextmanager
+def _local(count: int | None) -> Iterator[LocalCluster]:
+    """One process a core, one thread each, on loopback and without a dashboard."""
+    cores = count or len(os.sched_getaffinity(0))
+    settings = {
+        "distributed.nanny.pre-spawn-environ": _ONE_THREAD,
+        "distributed.scheduler.http.routes": [],
+        "distributed.worker.http.routes": [],
+    }
+    with dask.config.set(settings), _signals_for_us_alone():
+        cluster = LocalCluster(
+            n_workers=cores,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            # their web servers cannot be left out; they get free ports, and no page to serve
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            silence_logs=logging.ERROR,
+        )
+    with cluster:
+        yield cluster
+
+
+@contextmanager
+def _signals_for_us_alone() -> Iterator[None]:
+    """Threads and processes begun in here never hear Ctrl-C: this process alone decides."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _check(client: Client, scheduler: str) -> None:
+    try:
+        client.wait_for_workers(1, timeout=_WORKER_S)
+    except TimeoutError:
+        raise DeviceUnreachable(
+            f"--scheduler {scheduler}: has no workers; start `dask worker {scheduler}` where they"
+            " shall work"
+        ) from None
+    try:
+        theirs = client.submit(ready, pure=False).result(timeout=_WORKER_S)
+    except Exception as error:
+        theirs = f"{type(error).__name__}: {error}"
+    if theirs != ready():
+        raise DeviceUnreachable(
+            f"--scheduler {scheduler}: its workers need calibration-cell[study] {ready()}, as here;"
+            f" theirs: {theirs}"
+        )

@@ -1,0 +1,292 @@
+"""Studies on real worker processes: killed, stopped, gone on with; and on a scheduler's workers."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import dask
+import pyarrow.parquet as pq
+import pytest
+from distributed import LocalCluster
+
+from cell.cli.app import main
+from cell.errors import InputError
+from cell.files.plan_file import read_plan
+from cell.files.study_file import read_study
+from cell.simulate import simulate_corners, with_truth
+from cell.study import cluster, extra
+from cell.study.folder import RESULTS, StudyFolder
+from cell.study.kinds import kind_of
+from cell.study.run import Outcome, run_study
+from cell.study.trial import truth_of
+from tests.study.studies import seeds, study, write_plan, write_study
+
+Said = tuple[int, str, str]
+Cell = Callable[..., Said]
+
+
+def rows_on_disk(folder: Path) -> list[dict[str, Any]]:
+    """As anybody would read them."""
+    rows: list[dict[str, Any]] = pq.read_table(folder / RESULTS).to_pylist()
+    return rows
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """The address of a scheduler with a worker, in this process to be quick."""
+    with dask.config.set({"distributed.scheduler.http.routes": []}), LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tcp://",
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+    ) as there:  # fmt: skip
+        yield there.scheduler_address
+
+
+@pytest.fixture
+def cell(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Said]:
+    def call(*words: str | Path) -> Said:
+        monkeypatch.setattr(sys, "argv", ["cell", *map(str, words)])
+        with pytest.raises(SystemExit) as left:
+            main()
+        said = capsys.readouterr()
+        return int(left.value.code or 0), said.out, said.err
+
+    return call
+
+
+def test_a_worker_killed_in_the_middle_costs_nothing_but_its_task(tmp_path: Path) -> None:
+    asked, folder, killed = study(tmp_path, seeds(5)), tmp_path / "out", []
+
+    def kill_the_first_to_deliver(done: int, total: int) -> None:
+        if done and not killed:
+            killed.append(int(rows_on_disk(folder)[0]["worker"].split(":")[1]))
+            os.kill(killed[0], signal.SIGKILL)
+
+    outcome = run_study(asked, folder, workers=2, listener=kill_the_first_to_deliver)
+    assert killed
+    rows = rows_on_disk(folder)
+    assert sorted(row["key"] for row in rows) == [f"as it is/seed {k}" for k in range(5)]
+    assert {row["status"] for row in rows} == {"done"}
+    assert not outcome.failed
+
+
+def test_ctrl_c_stops_with_status_4_and_the_rest_is_done_later(
+    tmp_path: Path, scheduler: str
+) -> None:
+    path, folder = write_study(tmp_path, seeds(5)), tmp_path / "out"
+    program = [sys.executable, "-c", "from cell.cli import main; main()"]
+    words = ["study", str(path), "-o", str(folder), "--workers", "1"]
+    # in a group of its own, all of which hears Ctrl-C as it would in a terminal
+    running = subprocess.Popen(
+        [*program, *words], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    while not (parts := list((folder / RESULTS).glob("part-*"))):
+        assert running.poll() is None
+        time.sleep(0.02)
+    os.killpg(running.pid, signal.SIGINT)
+    _, said = running.communicate(timeout=60)
+    done = rows_on_disk(folder)
+    assert running.returncode == 4, said
+    assert 0 < len(done) < 5
+    assert said == (
+        f"error: Ctrl-C: {len(done)} of 5 tasks are done and written to {folder}; the same"
+        " command goes on from there\n"
+    )
+    before = {part: part.read_bytes() for part in parts}
+    run_study(read_study(path), folder, scheduler=scheduler)
+    assert {row["number"] for row in rows_on_disk(folder)} == set(range(5))
+    assert len(rows_on_disk(folder)) == 5
+    assert {part: part.read_bytes() for part in parts} == before
+
+
+@pytest.fixture(scope="module")
+def finished(
+    tmp_path_factory: pytest.TempPathFactory, scheduler: str
+) -> tuple[Path, Path, Outcome]:
+    """A study's file and folder, and what came out."""
+    content = """\
+monte_carlo:
+  plan: small.plan.yaml
+  seeds: 2
+  cases:
+  - {name: as it is}
+  - name: still
+    effects: []
+    noise: {corner_px: {uniform: [0.02, 0.1]}}
+"""
+    home = tmp_path_factory.mktemp("finished")
+    path = write_study(home, content)
+    return path, home / "out", run_study(read_study(path), home / "out", scheduler=scheduler)
+
+
+Finished = tuple[Path, Path, Outcome]
+
+
+def test_nothing_is_done_twice(finished: Finished) -> None:
+    path, folder, outcome = finished
+    parts = sorted((folder / RESULTS).iterdir())
+    again = run_study(read_study(path), folder, scheduler="tcp://127.0.0.1:1")
+    assert again.rows == outcome.rows
+    assert len(again.rows) == 4
+    assert sorted((folder / RESULTS).iterdir()) == parts
+
+
+def test_errors_are_held_against_the_truth(finished: Finished) -> None:
+    _, _, outcome = finished
+    cases = {case["case"]: case for case in outcome.summary["cases"]}
+    z = {
+        (name, solution["of"]): solution["z_rms"]
+        for name, case in cases.items()
+        for solution in case["solutions"]
+    }
+    assert z["as it is", "zhang_mle"] > 8
+    for told in ("zhang_mle", "fixed_alpha_mle", "joint_ml", "robot"):
+        assert 0.2 < z["still", told] < 3
+    assert 0.2 < z["as it is", "joint_ml"] < 3
+    drawn = [row["drawn"][0]["value"] for row in outcome.rows if row["case"] == "still"]
+    assert len(set(drawn)) == 2
+    assert all(0.02 < value < 0.1 for value in drawn)
+
+
+def test_a_changed_study_is_refused(finished: Finished) -> None:
+    path, folder, _ = finished
+    changed = path.with_name("changed.study.yaml")
+    changed.write_text(path.read_text().replace("0.1]", "0.2]"))
+    with pytest.raises(InputError, match=r"changed: study.monte_carlo.cases.1.noise.corner_px.uni"):
+        run_study(read_study(changed), folder)
+    plan = path.with_name("small.plan.yaml")
+    changed.with_name("other.plan.yaml").write_text(plan.read_text().replace("57.1", "50"))
+    changed.write_text(path.read_text().replace("small.plan", "other.plan"))
+    with pytest.raises(
+        InputError, match=r"changed: cell\.simulation\.effects\.0\.parameters\.k_px"
+    ):
+        run_study(read_study(changed), folder)
+
+
+def test_two_at_one_folder_are_refused(finished: Finished) -> None:
+    path, folder, _ = finished
+    asked = read_study(path)
+    with (
+        StudyFolder.opened(folder, asked, kind_of(asked).schema),
+        pytest.raises(InputError, match="another `cell study` is at work there"),
+    ):
+        run_study(asked, folder)
+
+
+def test_a_part_that_a_crash_left_is_dropped_and_none_is_overwritten(
+    tmp_path: Path, finished: Finished
+) -> None:
+    path, folder, _ = finished
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    (copy / RESULTS / ".part-000009.parquet").write_bytes(b"PAR1 half")
+    asked = read_study(path)
+    with StudyFolder.opened(copy, asked, kind_of(asked).schema) as store:
+        rows = store.rows()
+        store.add([{**rows[0], "key": "one more", "number": 99}])
+        assert len(store.rows()) == len(rows) + 1
+    last = sorted((copy / RESULTS).iterdir())[-1]
+    last.write_bytes(last.read_bytes()[:-20])
+    with pytest.raises(InputError, match=rf"{last.name}: is no whole Parquet file"):
+        run_study(asked, copy)
+
+
+def test_a_task_that_fails_is_a_row_with_its_reason(
+    tmp_path: Path, scheduler: str, cell: Cell
+) -> None:
+    content = """\
+monte_carlo:
+  plan: small.plan.yaml
+  seeds: 1
+  cases:
+  - {name: as it is}
+  - {name: odd, effects: [{name: frame_pose_swap, parameters: {frames: 3}}]}
+"""
+    path, folder = write_study(tmp_path, content), tmp_path / "out"
+    status, out, err = cell("study", path, "-o", folder, "--scheduler", scheduler, "--json")
+    assert (status, err) == (1, "")
+    told = json.loads(out)
+    assert told["tasks"] == 2
+    (failed,) = told["failed"]
+    assert failed["key"] == "odd/seed 0"
+    assert failed["reason"].startswith("frame_pose_swap: frames must be even")
+    assert {row["key"]: row["status"] for row in rows_on_disk(folder)} == {
+        "as it is/seed 0": "done",
+        "odd/seed 0": "failed",
+    }
+    status, out, _ = cell("study", path, "-o", folder)
+    assert status == 1
+    assert "failed: odd/seed 0: frame_pose_swap: frames must be even" in out
+    assert "2 tasks, 1 failed" in out
+
+
+def test_power_counts_what_the_diagnosis_names(tmp_path: Path, scheduler: str) -> None:
+    content = "power: {plan: small.plan.yaml, seeds: 1, effects: [{name: mount_flex}]}\n"
+    outcome = run_study(study(tmp_path, content), tmp_path / "out", scheduler=scheduler)
+    plain, flex = outcome.summary["effects"]
+    assert (plain["detected"]["share"], flex["detected"]["share"]) == (0.0, 1.0)
+    assert flex["alone"]["hits"] == flex["alone"]["runs"] == 1
+    (told,) = next(row for row in outcome.rows if row["effect"] == "mount_flex")["estimates"]
+    assert told["truth"] == 0.0005
+    assert abs(told["z"]) < 5
+
+
+def test_recordings_of_a_folder(tmp_path: Path, scheduler: str) -> None:
+    plan = read_plan(write_plan(tmp_path))
+    still = with_truth(plan, truth_of(plan).model_copy(update={"effects": ()}))
+    for name in ("good", "broken"):
+        simulate_corners(still, tmp_path / "runs" / name)
+    (tmp_path / "runs" / "broken" / "frames.jsonl").unlink()
+    (tmp_path / "runs" / "something else").mkdir()
+    before = sorted((tmp_path / "runs").rglob("*"))
+    asked = study(tmp_path, "recordings: {folders: ['runs/*'], verbs: [calibrate, diagnose]}\n")
+    outcome = run_study(asked, tmp_path / "out", scheduler=scheduler)
+    rows = {(row["verb"], Path(row["recording"]).name): row for row in outcome.rows}
+    assert {key for key, row in rows.items() if row["status"] == "failed"} == {
+        ("calibrate", "broken"),
+        ("diagnose", "broken"),
+    }
+    assert all("frames.jsonl: cannot be read" in row["reason"] for row in outcome.failed)
+    assert rows["diagnose", "good"]["verdict"] == "consistent"
+    calibration = json.loads(rows["calibrate", "good"]["document"])
+    assert calibration["schema"] == "cell.calibration/1"
+    assert sorted((tmp_path / "runs").rglob("*")) == before
+    (tmp_path / "runs" / "good").rename(tmp_path / "runs" / "later")
+    assert "later" in {Path(task.recording).name for task in kind_of(asked).tasks(asked)}  # type: ignore[attr-defined]
+
+
+def test_a_scheduler_that_is_not_there(
+    tmp_path: Path, cell: Cell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "REACH_S", 0.5)
+    path = write_study(tmp_path, seeds(1))
+    for address in ("tcp://127.0.0.1:1", "nonsense://x"):
+        status, _, err = cell("study", path, "-o", tmp_path / "out", "--scheduler", address)
+        assert status == 3
+        assert f"--scheduler {address}: no Dask scheduler answers there" in err
+        assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", extra.PACKAGES)
+def test_without_the_extra_it_says_how_to_install_it(
+    tmp_path: Path, cell: Cell, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setitem(sys.modules, name, None)
+    status, _, err = cell("study", write_study(tmp_path, seeds(1)))
+    assert status == 3
+    assert err.startswith(f"error: cell study needs {name} (")
+    assert "pip install 'calibration-cell[study]'" in err
