@@ -14,11 +14,20 @@ from distributed import Client, LocalCluster
 from cell.study.work import ready
 from drivers.errors import DeviceUnreachable
 
-logging.getLogger("distributed").setLevel(logging.ERROR)
+# its tracebacks of lost links are no news: what they mean is told in words
+logging.getLogger("distributed").setLevel(logging.CRITICAL)
 
 REACH_S = 10.0
 _WORKER_S = 60.0
-_ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+_SETTINGS = {
+    "distributed.nanny.pre-spawn-environ": dict.fromkeys(
+        ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"
+    ),
+    # a worker that died and is slow to come back on a busy machine would be given up after 15 s
+    "distributed.deploy.lost-worker-timeout": "1 day",
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+}
 
 
 @contextmanager
@@ -57,23 +66,19 @@ def workers_of(scheduler: str | None, count: int | None = None) -> Iterator[Clie
 def _local(count: int | None) -> Iterator[LocalCluster]:
     """One process a core, one thread each, on loopback and without a dashboard."""
     cores = count or len(os.sched_getaffinity(0))
-    settings = {
-        "distributed.nanny.pre-spawn-environ": _ONE_THREAD,
-        "distributed.scheduler.http.routes": [],
-        "distributed.worker.http.routes": [],
-    }
-    with dask.config.set(settings), _signals_for_us_alone():
-        cluster = LocalCluster(
-            n_workers=cores,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            # their web servers cannot be left out; they get free ports, and no page to serve
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-            silence_logs=logging.ERROR,
-        )
-    with cluster:
-        yield cluster
+    with dask.config.set(_SETTINGS):
+        with _signals_for_us_alone():
+            cluster = LocalCluster(
+                n_workers=cores,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                # their web servers cannot be left out; they get free ports, and no page to serve
+                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+                silence_logs=logging.CRITICAL,
+            )
+        with cluster:
+            yield cluster
 
 
 @contextmanager

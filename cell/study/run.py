@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from distributed import Client, Future
+from distributed import Client, Future, KilledWorker
 from rich.table import Table
 
 from cell.errors import StoppedByOperator
@@ -163,7 +163,12 @@ class _Shift:
                 " again when it is back"
             )
         error = future.exception()
-        return lost(task, error) if error is not None else future.result()
+        if isinstance(error, KilledWorker):
+            return lost(task, f"{error.allowed_failures + 1} workers died over it, one by one")
+        if error is not None:
+            return lost(task, f"{type(error).__name__}: {error}")
+        row: Row = future.result()
+        return row
 
     def _write(self) -> None:
         if self.held:

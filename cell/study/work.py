@@ -39,9 +39,9 @@ def ready() -> str:
     return version("calibration-cell")
 
 
-def lost(task: Task, error: BaseException) -> Row:
-    """The row of a task that never came to an end, mostly because it kills its worker."""
-    return _head(task, FAILED, f"{type(error).__name__}: {error}")
+def lost(task: Task, reason: str) -> Row:
+    """The row of a task that never came to an end."""
+    return _head(task, FAILED, reason)
 
 
 def _head(task: Task, status: str, reason: str | None) -> Row:
