@@ -7,6 +7,7 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 
 import dask
 from distributed import Client, LocalCluster
@@ -84,6 +85,8 @@ def _local(count: int | None) -> Iterator[LocalCluster]:
 @contextmanager
 def _signals_for_us_alone() -> Iterator[None]:
     """Threads and processes begun in here never hear Ctrl-C: this process alone decides."""
+    # starting it later would let the signal through again
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -69,7 +69,7 @@ def cell(
 
 
 def test_a_worker_killed_in_the_middle_costs_nothing_but_its_task(tmp_path: Path) -> None:
-    asked, folder, killed = study(tmp_path, seeds(5)), tmp_path / "out", []
+    asked, folder, killed = study(tmp_path, seeds(4)), tmp_path / "out", []
 
     def kill_the_first_to_deliver(done: int, total: int) -> None:
         if done and not killed:
@@ -79,7 +79,7 @@ def test_a_worker_killed_in_the_middle_costs_nothing_but_its_task(tmp_path: Path
     outcome = run_study(asked, folder, workers=2, listener=kill_the_first_to_deliver)
     assert killed
     rows = rows_on_disk(folder)
-    assert sorted(row["key"] for row in rows) == [f"as it is/seed {k}" for k in range(5)]
+    assert sorted(row["key"] for row in rows) == [f"as it is/seed {k}" for k in range(4)]
     assert {row["status"] for row in rows} == {"done"}
     assert not outcome.failed
 
@@ -87,7 +87,7 @@ def test_a_worker_killed_in_the_middle_costs_nothing_but_its_task(tmp_path: Path
 def test_ctrl_c_stops_with_status_4_and_the_rest_is_done_later(
     tmp_path: Path, scheduler: str
 ) -> None:
-    path, folder = write_study(tmp_path, seeds(5)), tmp_path / "out"
+    path, folder = write_study(tmp_path, seeds(4)), tmp_path / "out"
     program = [sys.executable, "-c", "from cell.cli import main; main()"]
     words = ["study", str(path), "-o", str(folder), "--workers", "1"]
     # in a group of its own, all of which hears Ctrl-C as it would in a terminal
@@ -101,15 +101,15 @@ def test_ctrl_c_stops_with_status_4_and_the_rest_is_done_later(
     _, said = running.communicate(timeout=60)
     done = rows_on_disk(folder)
     assert running.returncode == 4, said
-    assert 0 < len(done) < 5
+    assert 0 < len(done) < 4
     assert said == (
-        f"error: Ctrl-C: {len(done)} of 5 tasks are done and written to {folder}; the same"
+        f"error: Ctrl-C: {len(done)} of 4 tasks are done and written to {folder}; the same"
         " command goes on from there\n"
     )
     before = {part: part.read_bytes() for part in parts}
     run_study(read_study(path), folder, scheduler=scheduler)
-    assert {row["number"] for row in rows_on_disk(folder)} == set(range(5))
-    assert len(rows_on_disk(folder)) == 5
+    assert {row["number"] for row in rows_on_disk(folder)} == set(range(4))
+    assert len(rows_on_disk(folder)) == 4
     assert {part: part.read_bytes() for part in parts} == before
 
 
@@ -242,7 +242,7 @@ def test_power_counts_what_the_diagnosis_names(tmp_path: Path, scheduler: str) -
     assert flex["alone"]["hits"] == flex["alone"]["runs"] == 1
     (told,) = next(row for row in outcome.rows if row["effect"] == "mount_flex")["estimates"]
     assert told["truth"] == 0.0005
-    assert abs(told["z"]) < 5
+    assert abs(told["z"]) < 4
 
 
 def test_recordings_of_a_folder(tmp_path: Path, scheduler: str) -> None:
