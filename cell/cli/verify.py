@@ -51,7 +51,7 @@ def verify(
     as_json: JsonFlag = False,
 ) -> None:
     """Check an old calibration against the camera as it is now; exit status 1 unless it holds."""
-    from cell.cli.progress import picture_progress
+    from cell.cli.progress import counted_progress
     from cell.verify.verb import verify_into
     from cell.verify.words import text
 
@@ -59,7 +59,7 @@ def verify(
         raise InputError(f"--tolerance-mm {tolerance_mm:g}: must be above 0")
     known = _known(length_m, length_sigma_m, corners)
     recording, folder = _recording(source, calibration, dry_run, views, output)
-    with picture_progress() as progress:
+    with counted_progress("finding corners") as progress:
         found = verify_into(
             recording,
             calibration,
