@@ -1,6 +1,6 @@
 """How often `cell verify` is right: false alarms where nothing changed, and what it tells else.
 
-    python benchmarks/verify.py [RUNS] [PROCESSES]
+    python benchmarks/verify.py [RUNS] [PROCESSES] [PLAN...]
 
 Both shipped plans, simulated. In every run a calibration is made from the whole plan with its own
 noise; then eight views of the plan (`choose_views`) are taken anew with other noise, once for each
@@ -83,12 +83,15 @@ def one_run(job: tuple[str, int]) -> list[tuple[str, str, Judgement, bool]]:
     return found
 
 
-def main(runs: int = 50, processes: int = 2) -> None:
+def main(runs: int = 50, processes: int = 2, *plans: str) -> None:
     """Print what was told, by plan and case."""
-    jobs = [(name, seed) for name in PLANS for seed in range(1, runs + 1)]
+    jobs = [(name, seed) for name in plans or PLANS for seed in range(1, runs + 1)]
+    told = []
     with Pool(processes) as pool:
-        told = [row for rows in pool.imap_unordered(one_run, jobs) for row in rows]
-    for name in PLANS:
+        for done, rows in enumerate(pool.imap_unordered(one_run, jobs), start=1):
+            told += rows
+            print(f"\r{done} of {len(jobs)} runs", end="", file=sys.stderr)
+    for name in plans or PLANS:
         print(f"{name}, {runs} runs, {SHORT} views each")
         for case, right in CASES.items():
             rows = [(j, moved) for plan, c, j, moved in told if plan == name and c == case]
@@ -107,4 +110,4 @@ def main(runs: int = 50, processes: int = 2) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(*map(int, sys.argv[1:3]), *sys.argv[3:])

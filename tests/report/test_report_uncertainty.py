@@ -16,10 +16,12 @@ import pytest
 from calib.calibration import calibrate
 from calib.calibration.mapping import as_mapping
 from cell.report import ReportData
+from cell.report.figures.workpiece import of_solution
 from cell.report.numbers import millimetres
+from cell.report.sections.answer import answer
 from cell.report.sections.tables import tables
 from cell.report.sections.trust import sentences
-from cell.report.sections.uncertainty import uncertainty
+from cell.report.sections.uncertainty import in_words, uncertainty
 from tests.paper.scene import scene
 
 
@@ -88,3 +90,26 @@ def test_the_table_has_decentering_only_where_a_fit_freed_it() -> None:
     assert "0.001100 ± 0.000020" in page
     assert "held at 0" in page
     assert "k₃" not in page
+
+
+def test_the_first_sentence_counts_what_all_pictures_share() -> None:
+    data = _data()
+    assert data.calibration is not None
+    found = data.calibration["uncertainty"]
+    shared = np.sqrt((np.linalg.norm(found["workpiece_sigma_m"], axis=2) ** 2).mean(axis=1)).max()
+    best = of_solution(data, str(data.recommended))
+    assert best is not None
+    allows = float(np.hypot(best.p95_m, 2 * shared))
+    assert allows > 1.1 * best.p95_m
+    page = unescape(answer(data))
+    assert f"for work that allows {millimetres(allows)} at the work piece" in page
+    assert f"may be off by {millimetres(2 * shared)} (two sigma)" in page
+
+
+def test_numbers_that_go_together_are_told_as_a_reader_knows_them() -> None:
+    assert in_words(["flange_from_camera.z", "base_from_camera.rx", "v0_px", "focal"]) == [
+        "the camera's place along z on the flange",
+        "the camera's turn about x in the base",
+        "the principal point v0",
+        "focal",
+    ]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from cell.report import html
 from cell.report.data import ReportData
 from cell.report.figures import workpiece
@@ -11,6 +13,9 @@ from cell.report.figures.workpiece import WorkpieceError, by_distance, of_soluti
 from cell.report.numbers import UNKNOWN, known, millimetres, number, solution_name
 from cell.report.sections.drawing import drawing
 from cell.report.sections.trust import sentences
+from cell.report.sections.uncertainty import calibration_sigma_m
+
+_SIGMAS = 2.0
 
 _VERDICTS = {
     "consistent": ("Consistent", "nothing is missing beyond noise", "good"),
@@ -45,14 +50,14 @@ def verdict_words(data: ReportData) -> tuple[str, str, str]:
     verdict = (data.diagnosis or {}).get("verdict")
     if verdict in _VERDICTS:
         return _VERDICTS[verdict]
-    return "Not diagnosed", "the recording was not searched for missing physics", ""
+    return "Not diagnosed", "not searched for missing physics: run cell diagnose", ""
 
 
 def usable_m(data: ReportData) -> tuple[float, float] | None:
     """The range of distances the calibration vouches for, metres.
 
     Where the scale factor's dependence on distance is modelled, that is the range seen; where it
-    is taken as constant, zone 2.
+    is taken as constant, zone 2. Without flange poses, what the pictures alone say.
     """
     calibration = data.calibration or {}
     seen = [f["distance_m"] for f in calibration.get("scale_factors") or []]
@@ -60,7 +65,8 @@ def usable_m(data: ReportData) -> tuple[float, float] | None:
     if best is not None:
         seen += [float(best.distance_m.min()), float(best.distance_m.max())]
     if not seen:
-        return None
+        by_pictures = calibration.get("distance_range_m")
+        return None if by_pictures is None else (by_pictures[0], by_pictures[1])
     low, high = min(seen), max(seen)
     zones: dict[str, Any] = calibration.get("zones") or {}
     law = (calibration.get("focus_law") or {}).get("law")
@@ -99,17 +105,35 @@ def _sentence(data: ReportData, best: WorkpieceError | None) -> str:
             "The camera was calibrated, but neither its distances nor its error at the work "
             "piece are known from this recording."
         )
-    span = f"from {number(usable[0])} to {number(usable[1], 'm')}"
+    span = f"from {usable[0]:.2f} to {usable[1]:.2f} m"
     if best is None:
         return (
             f"The calibration covers distances {span}. Its error at the work piece is not known, "
             "because no flange pose was logged."
         )
-    return (
-        f"Use this camera {span}, for work that allows {millimetres(best.p95_m)} at the work "
-        f"piece: 95 % of {len(best.error_m)} frames stay below that, measured against "
-        f"{best.against}."
-    ) + _caution(data)
+    shared = calibration_sigma_m(data)
+    frames = f"95 % of {_frames(data, best)} stay below"
+    if shared is None:
+        why = f"{frames} that, measured against {best.against}."
+    else:
+        why = (
+            f"{frames} {millimetres(best.p95_m)} against {best.against}, and the calibration as a "
+            f"whole may be off by {millimetres(_SIGMAS * shared)} (two sigma)."
+        )
+    allows = millimetres(allowance_m(data, best))
+    return f"Use this camera {span}, for work that allows {allows} at the work piece: {why}" + (
+        _caution(data)
+    )
+
+
+def allowance_m(data: ReportData, best: WorkpieceError) -> float:
+    """What the work piece must allow: from picture to picture, and of all pictures together."""
+    return float(np.hypot(best.p95_m, _SIGMAS * (calibration_sigma_m(data) or 0.0)))
+
+
+def _frames(data: ReportData, best: WorkpieceError) -> str:
+    known_in, all_of = len(best.error_m), len(data.views)
+    return f"{known_in} frames" if known_in == all_of else f"{known_in} of {all_of} frames"
 
 
 def _caution(data: ReportData) -> str:
@@ -129,10 +153,8 @@ def _cards(data: ReportData, best: WorkpieceError | None) -> str:
             ),
             html.card(
                 "Error at the work piece",
-                UNKNOWN if best is None else f"{millimetres(best.rms_m)} RMS",
-                "no flange pose was logged"
-                if best is None
-                else f"95 % below {millimetres(best.p95_m)}; against {best.against}",
+                UNKNOWN if best is None else millimetres(allowance_m(data, best)),
+                "no flange pose was logged" if best is None else _error_note(data, best),
             ),
             _reprojection_card(data),
             html.card("Diagnosis", verdict, meaning, css),
@@ -140,8 +162,16 @@ def _cards(data: ReportData, best: WorkpieceError | None) -> str:
     )
 
 
+def _error_note(data: ReportData, best: WorkpieceError) -> str:
+    shared = calibration_sigma_m(data)
+    each = f"picture by picture {millimetres(best.rms_m)} RMS against {best.against}"
+    if shared is None:
+        return each
+    return f"at 95 %; {each}, all together {millimetres(shared)} (one sigma)"
+
+
 def _range(usable: tuple[float, float] | None) -> str:
-    return UNKNOWN if usable is None else f"{number(usable[0])} – {number(usable[1], 'm')}"
+    return UNKNOWN if usable is None else f"{usable[0]:.2f} – {usable[1]:.2f} m"
 
 
 def _zone_note(data: ReportData) -> str:

@@ -35,10 +35,45 @@ def uncertainty_sentences(data: ReportData) -> Iterator[str]:
             f"{number(found['distance_m'][-1], 'm')} (one sigma, image's mean)."
         )
     for weak in calibration.get("not_separable") or ():
-        yield (
-            f"These views hardly tell apart {_listed(weak['quantities'])}: record besides "
-            f"{weak['separate_with']}."
-        )
+        words = f"These views hardly tell apart {_listed(in_words(weak['quantities']))}"
+        more = weak["separate_with"]
+        helps = f"; {more}." if more.startswith("none") else f": record {more} as well."
+        yield words + helps
+
+
+def calibration_sigma_m(data: ReportData) -> float | None:
+    """One sigma at the work piece that all pictures share: image's mean, worst distance."""
+    found = (data.calibration or {}).get("uncertainty")
+    if not found:
+        return None
+    metres = np.linalg.norm(found["workpiece_sigma_m"], axis=2)
+    return max(_rms(at) for at in metres)
+
+
+_FRAMES = {
+    "flange_from_camera": "the camera's {} on the flange",
+    "base_from_camera": "the camera's {} in the base",
+    "base_from_board": "the board's {} in the base",
+    "flange_from_board": "the board's {} on the flange",
+}
+_NUMBERS = {
+    "alpha_px": "the focal length α",
+    "beta_px": "the focal length β",
+    "u0_px": "the principal point u0",
+    "v0_px": "the principal point v0",
+    "k1": "the distortion k1",
+    "k2": "the distortion k2",
+}
+
+
+def in_words(names: Sequence[str]) -> list[str]:
+    """The numbers of a calibration as a reader knows them."""
+    told = []
+    for name in names:
+        frame, _, axis = name.partition(".")
+        what = f"turn about {axis[1:]}" if axis.startswith("r") else f"place along {axis}"
+        told.append(_FRAMES[frame].format(what) if frame in _FRAMES else _NUMBERS.get(name, name))
+    return told
 
 
 def _told(found: Mapping[str, Any] | None) -> str:
@@ -88,10 +123,10 @@ def _not_separable(calibration: Mapping[str, Any]) -> str:
         if not calibration.get("robot"):
             return html.missing("Without a joint fit nothing is said of what goes together.")
         return html.paragraph("The views tell all fitted quantities apart.")
-    head = ("hardly told apart", "times worse than each alone", "record besides",
+    head = ("hardly told apart", "times worse than each alone", "record as well",
             "four such views help")  # fmt: skip
     rows = [
-        (_listed(w["quantities"]), number(w["inflation"], "", 2), w["separate_with"],
+        (_listed(in_words(w["quantities"])), number(w["inflation"], "", 2), w["separate_with"],
          f"{number(w['gain'], '', 2)} times")
         for w in found
     ]  # fmt: skip
