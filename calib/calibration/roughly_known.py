@@ -53,6 +53,28 @@ class Doubt:
     alpha_share: float
 
 
+def board_in_view(views: Views, alpha_px: float) -> FloatArray:
+    """(4, 4) camera_from_board of the first view by a pinhole of that scale factor.
+
+    Raises
+    ------
+    CalibrationError
+        The corners fix no homography.
+    """
+    homography = fit_homography(views.board.corners_m[:, :2], views.corners_px[0]).matrix
+    return np.asarray(board_poses(homography[None], camera_matrix(_pinhole(views, alpha_px)))[0])
+
+
+def _pinhole(views: Views, alpha_px: float) -> FloatArray:
+    return optics_row(
+        alpha_px=alpha_px,
+        beta_px=alpha_px,
+        u0_px=0.5 * (views.width_px - 1),
+        v0_px=0.5 * (views.height_px - 1),
+        height_px=views.height_px,
+    )
+
+
 def guess_from_one_view(
     views: Views, flange_from_mounted: FloatArray, alpha_px: float, *, refocuses: bool
 ) -> CellModel:
@@ -72,20 +94,12 @@ def guess_from_one_view(
     CalibrationError
         The corners fix no homography.
     """
-    optics = optics_row(
-        alpha_px=alpha_px,
-        beta_px=alpha_px,
-        u0_px=0.5 * (views.width_px - 1),
-        v0_px=0.5 * (views.height_px - 1),
-        height_px=views.height_px,
-    )
-    homography = fit_homography(views.board.corners_m[:, :2], views.corners_px[0]).matrix
-    camera_from_board = board_poses(homography[None], camera_matrix(optics))[0]
+    camera_from_board = board_in_view(views, alpha_px)
     in_hand = views.mount == "eye_in_hand"
     middle = camera_from_board if in_hand else rigid.inverse(camera_from_board)
     law = [make_effect("focus_breathing", {"law": "inverse_square"})] if refocuses else []
     return CellModel(
-        optics=optics,
+        optics=_pinhole(views, alpha_px),
         flange_from_mounted=flange_from_mounted,
         base_from_fixed=views.base_from_flange[0] @ flange_from_mounted @ middle,
         effects=tuple(law),

@@ -13,7 +13,7 @@ from calib.chain.model import CellModel, walk
 from calib.views import FloatArray
 from cell.bootstrap.knowledge import Knowledge
 from cell.errors import BadAnswer
-from cell.files.cell_file import CellFile
+from cell.files.cell_file import CellFile, Layout
 from cell.files.parts import Pose
 
 _GOOD_M = 0.01
@@ -35,6 +35,8 @@ class Found:
         At the distances seen.
     frames, rms_px:
         How many were fitted, and how well.
+    layout:
+        What it began with.
     """
 
     flange_from_mounted: FloatArray
@@ -47,10 +49,11 @@ class Found:
     alpha_sigma_px: float
     frames: int
     rms_px: float
+    layout: Layout
 
     @classmethod
-    def of(cls, known: Knowledge) -> Found:
-        """From the fit of the last frame."""
+    def of(cls, known: Knowledge, layout: Layout) -> Found:
+        """From the fit of the last frame, and the layout it began with."""
         fit, views = known.fit, known.views
 
         def alpha(model: CellModel) -> FloatArray:
@@ -72,6 +75,7 @@ class Found:
             float(alpha_sigma_px),
             len(views),
             float(np.sqrt(np.nanmean(np.sum(fit.residual_px**2, axis=2)))),
+            layout,
         )
 
     def check_good(self, refusal: str) -> None:
@@ -92,13 +96,12 @@ class Found:
 
     def in_cell(self, cell: CellFile) -> CellFile:
         """The cell with its layout replaced by what was found."""
-        assert cell.layout is not None
         found = {
             "mounted": _pose(self.flange_from_mounted),
             "fixed": _pose(self.base_from_fixed),
             "alpha_px": round(self.alpha_px, 1),
         }
-        return cell.model_copy(update={"layout": cell.layout.model_copy(update=found)})
+        return cell.model_copy(update={"layout": self.layout.model_copy(update=found)})
 
     def as_mapping(self) -> dict[str, Any]:
         """Plain data, units in the keys."""

@@ -55,6 +55,8 @@ class BootstrapGuide(Guide):
 
     Attributes
     ----------
+    layout:
+        What was told.
     knowledge:
         The fit of every frame so far, None before the first.
     refusal:
@@ -65,14 +67,15 @@ class BootstrapGuide(Guide):
         self._guard = guard
         self.knowledge: Knowledge | None = None
         self.refusal = ""
-        self._cell, self._layout, self._told = cell, layout, told
+        self.layout = layout
+        self._cell, self._told = cell, told
         self._centre_m = cell.board.board().corners_m.mean(axis=0)
         self._seen = Seen(cell)
         self._new: list[tuple[Shot, Detection]] = []
         self._wishes = list(WISHES)
         self._here = guard.start_rad
         self._middle: float | None = None
-        self._asked_for = 1
+        self._lost = 0
         self._is_back = False
 
     @property
@@ -97,20 +100,21 @@ class BootstrapGuide(Guide):
         view = None if self.knowledge is None else self._next_wish(self.knowledge)
         if view is None and not self._is_back:
             self._is_back = True
-            view = _view("back where it started", self._guard.start_rad)
+            view = view_of("back where it started", self._guard.start_rad)
         if view is not None:
-            self._asked_for += 1
             self._here = np.array(view.joints())
         return view
 
     def _learn(self) -> None:
+        self._lost += not self._new
         for shot, detection in self._new:
             check_model(self._guard, shot.state)
             self._add(shot, detection)
+            self._here = np.array(shot.state.joints_rad)
         self._new.clear()
 
     def _add(self, shot: Shot, detection: Detection) -> None:
-        mounted = self._layout.mounted.transform().as_matrix()
+        mounted = self.layout.mounted.transform().as_matrix()
         alpha_px = Sight.of(self._cell).alpha_px
         views = self._seen.add(shot, detection, self._model(mounted, alpha_px))
         refocuses = self._cell.camera.focus == "auto"
@@ -120,7 +124,7 @@ class BootstrapGuide(Guide):
             raise InputError(f"frame {shot.index}: {error}") from None
         if len(views) == 1:
             distance_m = float(walk(known.fit.model, views).distance_m[0])
-            check_place(self._cell, self._layout, known.fit.model, distance_m, self._told)
+            check_place(self._cell, self.layout, known.fit.model, distance_m, self._told)
         check_moves(self._cell, mounted, known.fit, self._told)
         self.knowledge = known
 
@@ -128,12 +132,12 @@ class BootstrapGuide(Guide):
         """The cell as far as it is known, to name a symmetric board's corners by."""
         if self.knowledge is not None:
             return self.knowledge.fit.model
-        fixed = self._layout.fixed.transform().as_matrix()
+        fixed = self.layout.fixed.transform().as_matrix()
         return CellModel(optics_row(alpha_px=alpha_px, beta_px=alpha_px), mounted, fixed)
 
     def _next_wish(self, known: Knowledge) -> View | None:
         reach = Reach.of(known, self._guard, self._here)
-        boldness = _AFTER_A_LOSS ** (self._asked_for - len(known.views))
+        boldness = _AFTER_A_LOSS**self._lost
         first, centre = known.first_camera_from_board, self._centre_m
         if self._middle is None:
             self._middle = 0.0
@@ -161,9 +165,10 @@ class BootstrapGuide(Guide):
             except SafetyError as refusal:
                 self.refusal = str(refusal)
                 continue
-            return boldness * share, _view(name, joints)
+            return boldness * share, view_of(name, joints)
         return 0.0, None
 
 
-def _view(name: str, joints_rad: FloatArray) -> View:
+def view_of(name: str, joints_rad: FloatArray) -> View:
+    """A plan's view at (6,) joint angles."""
     return View(name=name, joints_rad=tuple(joints_rad.tolist()))

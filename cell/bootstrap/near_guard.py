@@ -87,6 +87,8 @@ def enlarged(cell: CellFile, told: Told) -> CellFile:
     carried = outline_m(cell.board.board()) if cell.mount == "eye_to_hand" else np.zeros((1, 3))
     reach_m = float(np.linalg.norm(carried, axis=1).max())
     margin_m = told.mount_m + reach_m * 2.0 * float(np.sin(0.5 * told.mount_rad))
+    if cell.layout is None:  # what is at the flange may point anywhere
+        margin_m = told.reach_m + reach_m
     try:
         space = None if cell.workspace is None else _grown(cell.workspace, -margin_m)
     except ValidationError:

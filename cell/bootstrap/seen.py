@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +15,8 @@ from calib.detection.orientation import possible_turns, turned_order
 from calib.views import FloatArray, Views
 from cell.files.cell_file import CellFile
 from cell.sequencer.shot import Shot
+
+Known = TypeVar("Known")
 
 
 @dataclass
@@ -30,10 +34,17 @@ class Seen:
     cell: CellFile
     views: Views | None = field(default=None, init=False)
 
-    def add(self, shot: Shot, detection: Detection, model: CellModel) -> Views:
-        """All views, this frame the last; `model` names the corners of a symmetric board."""
+    def add(self, shot: Shot, detection: Detection, model: CellModel | None = None) -> Views:
+        """All views, this frame the last.
+
+        The corners of a symmetric board are named as `model` sees them, and without one as they
+        lay in the frame before.
+        """
         view = self._view(shot, detection)
-        view = _named_alike(view, model, first=self.views is None)
+        if model is not None:
+            view = _named_as(view, _turned_rad if self.views is None else _missed_px, model)
+        elif self.views is not None:
+            view = _named_as(view, _moved_px, self.views)
         self.views = view if self.views is None else self.views.joined(view)
         return self.views
 
@@ -53,11 +64,15 @@ class Seen:
         return replace(view, frame=np.array([shot.index]))
 
 
-def _named_alike(view: Views, model: CellModel, *, first: bool) -> Views:
+def _named_as(view: Views, misfit: Callable[[Views, Known], float], known: Known) -> Views:
     ways = [view.corners_px[:, turned_order(view.board, t)] for t in possible_turns(view.board)]
-    named = [replace(view, corners_px=corners) for corners in ways]
-    misfit = _turned_rad if first else _missed_px
-    return min(named, key=lambda one: misfit(one, model))
+    return min(
+        (replace(view, corners_px=corners) for corners in ways), key=lambda one: misfit(one, known)
+    )
+
+
+def _moved_px(view: Views, before: Views) -> float:
+    return float(np.nanmean(np.linalg.norm(view.corners_px - before.corners_px[-1], axis=2)))
 
 
 def _turned_rad(view: Views, model: CellModel) -> float:

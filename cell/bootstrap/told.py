@@ -24,12 +24,15 @@ class Told:
         Of the position in `layout.fixed`.
     alpha_share:
         Of the scale factor, as a share of it.
+    reach_m:
+        How far the camera or the board may be from the flange's centre, where there is no layout.
     """
 
     mount_m: float = 0.05
     mount_rad: float = float(np.radians(10.0))
     fixed_m: float = 0.2
     alpha_share: float = 0.2
+    reach_m: float = 0.15
 
     @property
     def doubt(self) -> Doubt:

@@ -12,14 +12,16 @@ from calib.views import FloatArray
 from cell.bootstrap.found import Found
 from cell.bootstrap.guide import BootstrapGuide
 from cell.bootstrap.near_guard import JOINT_SPEED_DEG_S, SPEED_M_S, NearGuard
+from cell.bootstrap.probing import ProbingGuide
 from cell.bootstrap.standing import where_it_stands
 from cell.bootstrap.told import Told
 from cell.errors import InputError
 from cell.factory import real_devices, simulated_devices
-from cell.files.cell_file import CellFile, Layout, read_cell
+from cell.files.cell_file import CellFile, read_cell
 from cell.files.plan_file import SCHEMA, Plan, PlanFile
 from cell.files.writing import check_new, write_new, yaml_text
 from cell.planning import design_plan
+from cell.planning.candidates import Sight
 from cell.sequencer.sequencer import Devices
 from cell.sequencer.session import record_plan
 from cell.sequencer.states import Finish, RunResult
@@ -34,10 +36,10 @@ class Bootstrap:
 
     Attributes
     ----------
-    path, cell, layout:
-        The cell file, read.
+    path, cell:
+        The cell file, read; its layout may be missing.
     told:
-        How far its layout may be off.
+        How far the layout may be off.
     recording:
         Folder of the frames.
     found_path, plan_path:
@@ -46,7 +48,6 @@ class Bootstrap:
 
     path: Path
     cell: CellFile
-    layout: Layout
     told: Told
     recording: Path
     found_path: Path
@@ -71,24 +72,37 @@ class Bootstrap:
             The cell does not say enough, or the results are in the way of older ones.
         """
         cell = read_cell(path)
-        if cell.layout is None:
-            raise InputError(
-                f"{path}: has no `layout`; write a rough one, 50 mm, 10° and, for the board,"
-                " 200 mm are near enough"
-            )
+        Sight.of(cell)  # a lens nobody knows is found out before anything moves
         stem = path.name.split(".")[0]
         found, plan = beside / f"{stem}.found.yaml", beside / f"{stem}.found.plan.yaml"
         check_new(found)
         check_new(plan)
-        return cls(path, cell, cell.layout, told, recording, found, plan)
+        return cls(path, cell, told, recording, found, plan)
 
     def devices(self, *, dry_run: bool, start_deg: tuple[float, ...] | None = None) -> Devices:
-        """Arm and camera; in a dry run the arm stands at `start_deg`, or the layout's home."""
-        home_deg = self.layout.home_deg if start_deg is None else start_deg
-        layout = self.layout.model_copy(update={"home_deg": home_deg})
-        cell = self.cell.model_copy(update={"layout": layout})
-        plan = self._plan(np.radians(home_deg), cell)
-        return simulated_devices(plan) if dry_run else real_devices(plan)
+        """Arm and camera; in a dry run the arm stands at `start_deg`, or the layout's home.
+
+        Raises
+        ------
+        InputError
+            The cell's devices are simulated and this is no dry run, or nobody tells where the
+            simulated arm stands.
+        """
+        if not dry_run:
+            return real_devices(self._plan(np.zeros(6), self.cell))
+        cell, layout = self.cell, self.cell.layout
+        if start_deg is None and layout is None:
+            raise InputError(
+                f"{self.path}: has no layout.home_deg: say with --start-deg where the simulated"
+                " arm stands"
+            )
+        if start_deg is None:
+            assert layout is not None
+            start_deg = layout.home_deg
+        elif layout is not None:
+            layout = layout.model_copy(update={"home_deg": start_deg})
+            cell = cell.model_copy(update={"layout": layout})
+        return simulated_devices(self._plan(np.radians(start_deg), cell))
 
     def run(
         self, devices: Devices, *, simulated: bool, watchers: Iterable[Watcher] = ()
@@ -103,7 +117,7 @@ class Bootstrap:
         start_rad = where_it_stands(devices.arm)
         guard = NearGuard.around(self.cell, start_rad, self.told)
         guard.check_start()
-        guide = BootstrapGuide(self.cell, self.layout, guard, self.told)
+        guide = self._guide(guard)
         result = record_plan(
             self._plan(start_rad, self.cell),
             self.recording,
@@ -112,9 +126,16 @@ class Bootstrap:
             watchers=watchers,
             guide=guide,
         )
-        if result.finish not in _MOVED_THROUGH or guide.knowledge is None:
+        told = guide.then if isinstance(guide, ProbingGuide) else guide
+        if result.finish not in _MOVED_THROUGH or told is None or told.knowledge is None:
             return Bootstrapped(result)
-        return Bootstrapped(result, Found.of(guide.knowledge), guide.refusal)
+        return Bootstrapped(result, Found.of(told.knowledge, told.layout), told.refusal)
+
+    def _guide(self, guard: NearGuard) -> BootstrapGuide | ProbingGuide:
+        layout = self.cell.layout
+        if layout is None:
+            return ProbingGuide(self.cell, guard, self.told)
+        return BootstrapGuide(self.cell, layout, guard, self.told)
 
     def _plan(self, start_rad: FloatArray, cell: CellFile) -> Plan:
         """The view from where the arm stands; the guide adds the others."""

@@ -41,6 +41,12 @@ def bootstrap(
     fixed_mm: Annotated[
         float, typer.Option(min=0, help="How far the place in layout.fixed may be off.")
     ] = 200.0,
+    reach_mm: Annotated[
+        float,
+        typer.Option(
+            min=0, help="Without a layout: how far camera or board may be from the flange's centre."
+        ),
+    ] = 150.0,
     as_json: JsonFlag = False,
 ) -> None:
     """Find camera and board by a few small, slow moves, and plan the rest.
@@ -53,7 +59,9 @@ def bootstrap(
     start = _angles(start_deg, dry_run)
     name = cell.name.split(".")[0]
     recording = output or new_folder(f"{name}-bootstrap")
-    told = Told(1e-3 * mount_mm, float(np.radians(mount_deg)), 1e-3 * fixed_mm)
+    told = Told(
+        1e-3 * mount_mm, float(np.radians(mount_deg)), 1e-3 * fixed_mm, reach_m=1e-3 * reach_mm
+    )
     task = Bootstrap.of(cell, recording, output or cell.parent, told)
     devices = task.devices(dry_run=dry_run, start_deg=start)
     say(f"{'SIMULATED' if dry_run else 'real'} arm and camera; recording {recording}")
