@@ -45,7 +45,8 @@ def write_new(path: Path, text: str) -> None:
     """Write a file that is not there yet; raises `InputError`."""
     check_new(path)
     try:
-        path.write_text(text, encoding="utf-8")
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
     except OSError as fault:
         raise InputError(f"{path}: cannot be written: {fault.strerror}") from None
 

@@ -17,7 +17,7 @@ from calib.views import BoolArray, FloatArray, Views
 from cell.bootstrap import Bootstrap, Told
 from cell.bootstrap.found import Found
 from cell.bootstrap.near_guard import FARTHEST_M, FARTHEST_RAD, TRAVEL_RAD
-from cell.files.cell_file import CellFile, EffectFile, read_cell
+from cell.files.cell_file import CellFile, EffectFile, Layout, read_cell
 from cell.files.parts import Pose
 from cell.files.plan_file import read_plan
 from cell.files.writing import yaml_text
@@ -193,9 +193,11 @@ class Trial:
     @property
     def _guard(self) -> Guard:
         """Knows the truth."""
-        assert self.cell.layout is not None
-        assert self.cell.simulation is not None
-        layout = self.cell.layout.model_copy(update={"mounted": self.cell.simulation.mounted})
+        truth, home_deg = self.cell.simulation, tuple(np.degrees(self.start_rad).tolist())
+        assert truth is not None
+        layout = Layout(
+            mounted=truth.mounted, fixed=truth.fixed, home_deg=home_deg, distances_m=(0.3, 1.0)
+        )
         return Guard(self.cell.model_copy(update={"layout": layout}), 1.0, 1.0)
 
 
