@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help run test lint types layers setup clean
+.PHONY: help run test lint types layers docs setup clean
 setup: $(STAMP)  ## install into .venv
 
 help:  ## this list
@@ -21,7 +21,7 @@ $(STAMP): pyproject.toml tools/install-debian-packages
 run: $(STAMP)  ## the paper's larger cell, simulated, with its report
 	$(BIN)/cell run --dry-run
 
-test: $(STAMP) lint types layers  ## lint, types, layers and every test
+test: $(STAMP) lint types layers docs  ## lint, types, layers, docs and every test
 	tools/install-mrcal
 	$(BIN)/python -m pytest -n 2
 
@@ -34,6 +34,9 @@ types: $(STAMP)  ## mypy, strict
 
 layers: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
+
+docs: $(STAMP)  ## build/docs, every link and anchor checked
+	$(BIN)/mkdocs build --strict --config-file tools/mkdocs.yml
 
 clean:  ## remove .venv
 	rm -rf $(VENV)

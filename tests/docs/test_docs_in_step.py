@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,7 @@ from cell.errors import EXIT_SAFETY
 from cell.files.plan_file import read_plan
 from cell.simulate import with_effects
 from tests.docs.pages import ROOT, assert_same, blocks, commands, run_command
+from tools import reference_pages
 from tools.effect_pages import FOLDER, pages
 
 README = ROOT / "README.md"
@@ -72,6 +75,32 @@ def test_every_page_is_reached_from_the_readme() -> None:
 def test_pages_of_the_effects_are_in_step() -> None:
     written = {path.name: path.read_text(encoding="utf-8") for path in FOLDER.glob("*.md")}
     assert written == pages(), "python tools/effect_pages.py"
+
+
+def test_pages_of_the_reference_are_in_step() -> None:
+    written = {
+        path.name: path.read_text(encoding="utf-8") for path in reference_pages.FOLDER.glob("*.md")
+    }
+    assert written == reference_pages.pages(), "python tools/reference_pages.py"
+
+
+def test_the_site_builds_and_no_link_or_anchor_leads_nowhere(tmp_path: Path) -> None:
+    config = ROOT / "tools" / "mkdocs.yml"
+    build = [
+        sys.executable,
+        "-m",
+        "mkdocs",
+        "build",
+        "--strict",
+        "-q",
+        "-f",
+        config,
+        "-d",
+        tmp_path,
+    ]
+    built = subprocess.run(build, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    assert (tmp_path / "reference" / "verbs.html").exists()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)
