@@ -22,6 +22,7 @@ run: $(STAMP)  ## the paper's larger cell, simulated, with its report
 	$(BIN)/cell run --dry-run
 
 test: $(STAMP) lint types layers docs  ## lint, types, layers, docs and every test
+	tools/install-debian-packages test
 	tools/install-mrcal
 	$(BIN)/python -m pytest -n 2
 

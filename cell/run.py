@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calib.chain.model import CellModel
 from calib.detection import Detection
@@ -27,9 +28,46 @@ from cell.sequencer.states import Finish, RunResult
 from cell.sequencer.watcher import Watcher
 from cell.simulated import home_of, simulated_cell
 
+if TYPE_CHECKING:
+    from cell.page.live_run import LiveRun
+
+
+@contextmanager
+def shown_on_page(
+    address: str | None, plan: Plan, folder: Path, *, dry_run: bool
+) -> Iterator[LiveRun | None]:
+    """Serve the live page while the context holds; None where no address is given.
+
+    Raises
+    ------
+    InputError
+        The address cannot be had.
+    """
+    if address is None:
+        yield None
+        return
+    from cell.page.address import Address
+    from cell.page.live_run import LiveRun
+    from cell.page.server import LivePage
+
+    live = LiveRun(plan, simulated=dry_run, folder=str(folder))
+    with LivePage(live, Address.parse(address)) as url:
+        say(f"live page: {url}")
+        try:
+            yield live
+        except BaseException as fault:
+            live.ended(str(fault) or type(fault).__name__, {})
+            raise
+
 
 def record(
-    plan: Plan, folder: Path, *, dry_run: bool, resume: bool, peers: bool = False
+    plan: Plan,
+    folder: Path,
+    *,
+    dry_run: bool,
+    resume: bool,
+    peers: bool = False,
+    live: LiveRun | None = None,
 ) -> RunResult:
     """Run a plan into a recording, with its progress in the terminal.
 
@@ -37,6 +75,8 @@ def record(
     ----------
     dry_run, peers:
         Simulated devices; in this process, or behind the real drivers and their protocols.
+    live:
+        The run on the live page, which may stop it; None without one.
 
     Raises
     ------
@@ -50,18 +90,26 @@ def record(
     with ExitStack() as stack:
         devices = stack.enter_context(_devices(plan, dry_run, peers))
         watchers: list[Watcher] = [stack.enter_context(run_progress(simulated=dry_run))]
-        if goal is not None:
+        if goal is not None or live is not None:
             estimate = RunningEstimate(plan, folder if resume else None, goal)
             watchers.append(stack.enter_context(estimate))
-        return record_plan(
+        if live is not None:
+            estimate.on_estimate(live.estimated)
+            watchers.append(live)
+        result = record_plan(
             plan,
             folder,
             devices,
             simulated=dry_run,
             resume=resume,
+            stop=live.stop if live else None,
+            requests=live.requests if live else None,
             watchers=watchers,
             goal=goal,
         )
+    if live is not None:
+        live.recorded(result)
+    return result
 
 
 def _devices_are(dry_run: bool, peers: bool) -> str:
@@ -98,6 +146,12 @@ class Outcome:
     text: str
     mapping: dict[str, Any]
 
+    @property
+    def files(self) -> dict[str, str]:
+        """What was written, by what it is."""
+        written = ("recording", "calibration", "diagnosis", "report")
+        return {name: self.mapping[name] for name in written if name in self.mapping}
+
     @classmethod
     def of(cls, result: RunResult, folder: Path) -> Outcome:
         """The outcome of recording alone."""
@@ -118,11 +172,17 @@ class Outcome:
 
 
 def evaluate(
-    outcome: Outcome, result: RunResult, *, simulated: bool, truth: CellModel | None = None
+    outcome: Outcome,
+    result: RunResult,
+    *,
+    simulated: bool,
+    truth: CellModel | None = None,
+    tell: Callable[[str], None] = say,
 ) -> Outcome:
     """Calibrate and diagnose a finished run; the results go into the recording's folder.
 
-    `truth` is the simulated cell of a dry run; the report holds the results against it.
+    `truth` is the simulated cell of a dry run; the report holds the results against it. `tell`
+    hears what is being done.
 
     Raises
     ------
@@ -133,14 +193,14 @@ def evaluate(
     if not recording.has_detections:
         corners = corners_of_run(recording, result.detections)
         write_corners(outcome.folder / DETECTIONS, corners, recording.board)
-    say("calibrating")
+    tell("calibrating")
     calibrated, folder = calibrate_into(recording, outcome.folder, simulated=simulated)
     calibrates = replace(
         outcome,
         text=f"{outcome.text}\n{calibration_summary(calibrated.mapping)}",
         mapping=outcome.mapping | _files(folder, "calibration.json", "report.html"),
     )
-    say("diagnosing; this takes a minute or more")
+    tell("diagnosing; this takes a minute or more")
     try:
         diagnosed = diagnose_into(
             recording, folder, simulated=simulated, calibrated=calibrated, truth=truth

@@ -17,6 +17,7 @@ from cell.cli.doctor import doctor
 from cell.cli.export import export
 from cell.cli.importing import import_
 from cell.cli.output import say_error
+from cell.cli.page_option import WithPage
 from cell.cli.plan import plan
 from cell.cli.run import run
 from cell.cli.simulate import simulate
@@ -45,7 +46,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "doctor": doctor,
 }
 for name, verb in VERBS.items():
-    app.command(name)(verb)
+    app.command(name, cls=WithPage if verb is run else None)(verb)
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ import typer
 
 from cell.cli.output import JsonFlag, new_folder, say, say_error, show
 from cell.errors import InputError
+from cell.page.address import DEFAULT
 
 DEFAULT_PLAN = Path(__file__).parents[1] / "defaults" / "irb140-eosens.plan.yaml"
 
@@ -36,24 +37,44 @@ def run(
     record_only: Annotated[
         bool, typer.Option("--record-only", help="Do not calibrate and diagnose afterwards.")
     ] = False,
+    page: Annotated[
+        str | None,
+        typer.Option(
+            "--page",
+            metavar="[HOST:PORT]",
+            help=f"Show the run in a browser, with Pause, Skip and Stop; {DEFAULT} where no"
+            " address is given. An address that other computers reach needs the token that is"
+            " printed with it.",
+        ),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Move, grab and log every view of a plan, then calibrate, diagnose and report."""
     from cell.files.plan_file import read_plan
-    from cell.run import Outcome, evaluate, record, truth_of
+    from cell.run import Outcome, evaluate, record, shown_on_page, truth_of
     from cell.sequencer.states import Finish
 
     if peers and not dry_run:
         raise InputError("--peers goes with --dry-run: cell run PLAN.yaml --dry-run --peers")
     path = _plan_path(plan, dry_run)
     folder = _folder(path, output, resume)
-    result = record(read_plan(path), folder, dry_run=dry_run, resume=resume, peers=peers)
-    outcome = Outcome.of(result, folder)
-    for view, reason in result.skipped.items():
-        say(f"skipped view {view}: {reason}")
-    if outcome.complete and not record_only:
-        truth = truth_of(path) if dry_run else None
-        outcome = evaluate(outcome, result, simulated=dry_run, truth=truth)
+    read = read_plan(path)
+    with shown_on_page(page, read, folder, dry_run=dry_run) as live:
+
+        def tell(words: str) -> None:
+            say(words)
+            if live is not None:
+                live.say(words)
+
+        result = record(read, folder, dry_run=dry_run, resume=resume, peers=peers, live=live)
+        outcome = Outcome.of(result, folder)
+        for view, reason in result.skipped.items():
+            say(f"skipped view {view}: {reason}")
+        if outcome.complete and not record_only:
+            truth = truth_of(path) if dry_run else None
+            outcome = evaluate(outcome, result, simulated=dry_run, truth=truth, tell=tell)
+        if live is not None:
+            live.ended(outcome.text, outcome.files)
     report = outcome.mapping.get("report")
     text = f"{outcome.text}\nreport: {report}" if report else outcome.text
     show(text, outcome.mapping, as_json=as_json)

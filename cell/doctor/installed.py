@@ -24,6 +24,8 @@ _ALWAYS = (
     "pydantic",
     "ruamel.yaml",
     "matplotlib",
+    "starlette",
+    "uvicorn",
 )
 _OF_DRIVER = {
     "ur": ("ur-rtde", "pip install 'calibration-cell[ur]'"),

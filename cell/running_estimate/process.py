@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import queue
@@ -21,6 +22,8 @@ from cell.recording import FrameRecord, read_recording
 from cell.running_estimate.early_end import EarlyEnd
 from cell.running_estimate.estimate import FEWEST_FRAMES, Estimate, Estimator
 from cell.sequencer.watcher import Checked, Watcher
+
+log = logging.getLogger(__name__)
 
 _END_S = 1.0
 _LESS_URGENT = 10
@@ -118,8 +121,7 @@ class RunningEstimate(Watcher):
                 told = self._link.recv()
                 if isinstance(told, Estimate):
                     self.latest = told
-                    for heard in self._heard:
-                        heard(told)
+                    self._tell(told)
                 elif self._goal is not None:
                     self._goal.catch_up()
         except (EOFError, OSError):
@@ -127,6 +129,14 @@ class RunningEstimate(Watcher):
         finally:
             if self._goal is not None:
                 self._goal.catch_up()
+
+    def _tell(self, estimate: Estimate) -> None:
+        for heard in tuple(self._heard):
+            try:
+                heard(estimate)
+            except Exception as fault:  # one that fails must not keep the goal from hearing
+                self._heard.remove(heard)
+                log.warning("an estimate could not be shown: %s", fault)
 
 
 def _serve(link: Connection, plan: Plan, recorded: Path | None) -> None:
