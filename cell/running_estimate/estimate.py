@@ -14,7 +14,7 @@ from calib.views import FloatArray, Views
 from cell.calibrate import same_order_everywhere
 from cell.files.plan_file import Plan
 from cell.recording import Corners, FrameRecord, Recording
-from cell.running_estimate.view_kinds import Sights, lacking, planned_flange_poses
+from cell.running_estimate.view_kinds import Sights, lacking
 from cell.sequencer.session import header_of
 
 FEWEST_FRAMES = 5
@@ -73,13 +73,13 @@ class Estimator:
 
     Parameters
     ----------
-    plan:
-        The run's plan: its views say which distances and tilts are wanted.
+    plan, planned_poses:
+        The run's plan; (V, 4, 4) base_from_flange of its views, which say what distances and tilts
+        are wanted.
     """
 
-    def __init__(self, plan: Plan) -> None:
-        self._plan = plan
-        self._planned = planned_flange_poses(plan)
+    def __init__(self, plan: Plan, planned_poses: FloatArray) -> None:
+        self._plan, self._planned = plan, planned_poses
         self._frames: dict[int, FrameRecord] = {}
         self._px: dict[int, FloatArray] = {}
         self._sigma_px: dict[int, FloatArray] = {}

@@ -21,12 +21,13 @@ from cell.files.plan_file import Plan
 from cell.recording import FrameRecord, read_recording
 from cell.running_estimate.early_end import EarlyEnd
 from cell.running_estimate.estimate import FEWEST_FRAMES, Estimate, Estimator
+from cell.running_estimate.view_kinds import planned_flange_poses
 from cell.sequencer.watcher import Checked, Watcher
 
 log = logging.getLogger(__name__)
 
 _END_S = 1.0
-_LESS_URGENT = 10
+_LESS_URGENT = 5
 _BEFORE_THE_LAST = 2
 """Frames left out of the first of the two estimates of a run that is gone on with."""
 
@@ -51,24 +52,23 @@ class RunningEstimate(Watcher):
     goal:
         Heeds every estimate, where the plan may end early.
 
-    Attributes
-    ----------
-    latest:
-        The newest estimate, or None.
-    failure:
-        Why there will be no more, in words; empty while there may be.
+    Raises
+    ------
+    InputError
+        As `planned_flange_poses` does.
     """
 
     def __init__(self, plan: Plan, recorded: Path | None, goal: EarlyEnd | None) -> None:
-        self.latest: Estimate | None = None
-        self.failure = ""
-        self._goal = goal
+        self._goal, self._ending = goal, False
         self._heard: list[Callable[[Estimate], None]] = [] if goal is None else [goal.heed]
         self._frames: queue.SimpleQueue[_Found | None] = queue.SimpleQueue()
         context = multiprocessing.get_context("spawn")
         self._link, self._there = context.Pipe()
         self._process = context.Process(
-            target=_serve, args=(self._there, plan, recorded), name="estimate", daemon=True
+            target=_serve,
+            args=(self._there, plan, planned_flange_poses(plan), recorded),
+            name="estimate",
+            daemon=True,
         )
         self._threads = [
             threading.Thread(target=work, name="estimate", daemon=True)
@@ -98,6 +98,7 @@ class RunningEstimate(Watcher):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._ending = True
         self._frames.put(None)
         self._process.terminate()
         self._process.join(_END_S)
@@ -120,12 +121,12 @@ class RunningEstimate(Watcher):
             while True:
                 told = self._link.recv()
                 if isinstance(told, Estimate):
-                    self.latest = told
                     self._tell(told)
                 elif self._goal is not None:
                     self._goal.catch_up()
         except (EOFError, OSError):
-            self.failure = "the estimate's process has ended"
+            if not self._ending:
+                log.warning("the running estimate has died; the run takes all its views")
         finally:
             if self._goal is not None:
                 self._goal.catch_up()
@@ -139,13 +140,13 @@ class RunningEstimate(Watcher):
                 log.warning("an estimate could not be shown: %s", fault)
 
 
-def _serve(link: Connection, plan: Plan, recorded: Path | None) -> None:
+def _serve(link: Connection, plan: Plan, planned_poses: FloatArray, recorded: Path | None) -> None:
     """In the process: estimate whenever there is something new, until the other end is gone."""
     # Ctrl-C and a closed terminal reach the whole group; the run decides when this ends
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     os.nice(_LESS_URGENT)
-    estimator = Estimator(plan)
+    estimator = Estimator(plan, planned_poses)
     try:
         if recorded is not None:
             _look_back(link, estimator, recorded)

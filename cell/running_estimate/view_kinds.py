@@ -7,9 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from calib.chain.kinematics import arm
 from calib.views import Board, FloatArray
+from cell.errors import InputError
 from cell.files.plan_file import Plan
+from cell.sequencer.guard import Guard
 
 FLAT_RAD = np.radians(10.0)
 """Less tilted than this counts as flat."""
@@ -19,15 +20,23 @@ _TILTS = ("turned to the left or right", "tipped up or down")
 
 
 def planned_flange_poses(plan: Plan) -> FloatArray:
-    """(V, 4, 4) base_from_flange of a plan's views."""
-    poses = []
-    for view in plan.file.views:
+    """(V, 4, 4) base_from_flange of a plan's views.
+
+    Raises
+    ------
+    InputError
+        The arm is not known, or a view has too many or too few joint angles.
+    """
+    kinematics, poses = Guard.of(plan).kinematics, []
+    for index, view in enumerate(plan.file.views):
         joints = view.joints()
         if joints is None:
             assert view.base_from_flange is not None
             poses.append(view.base_from_flange.transform().as_matrix())
+        elif len(joints) == len(kinematics.limits_rad):
+            poses.append(kinematics.forward(np.array(joints)))
         else:
-            poses.append(arm(plan.cell.robot.model or "").forward(np.array(joints)))
+            raise InputError(f"{plan.where(index)}: has {len(joints)} joint angles, the arm has 6")
     return np.array(poses)
 
 

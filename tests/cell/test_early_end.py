@@ -21,6 +21,7 @@ from cell.files.plan_file import Plan, Until, read_plan
 from cell.recording import read_recording
 from cell.running_estimate.early_end import EarlyEnd
 from cell.running_estimate.estimate import Estimate
+from cell.running_estimate.process import RunningEstimate
 from cell.running_estimate.view_kinds import Sights, lacking, planned_flange_poses
 from cell.sequencer.journal import read_journal
 from cell.sequencer.sequencer import Devices
@@ -255,3 +256,24 @@ def test_a_run_gone_on_with_is_judged_by_the_pictures_of_before(tmp_path: Path) 
     assert (told["finish"], told["frames"]) == ("completed", stopped.frames)
     assert told["ended_early"].startswith("alpha is known to 0.")
     assert "ending early: alpha is known" in said.stderr
+
+
+def test_an_estimate_that_dies_leaves_the_run_alone(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    plan = read_plan(strided_plan(tmp_path, "until: {alpha_sigma_px: 2.0}"))
+    assert plan.file.until is not None
+    goal = EarlyEnd(plan.file.until)
+    with RunningEstimate(plan, None, goal) as running:
+        running._process.kill()
+        goal.caught_up().result(timeout=60)
+        assert not goal.reached()
+    assert "the run takes all its views" in caplog.text
+
+
+def test_a_plan_for_an_arm_nobody_knows_is_refused_before_anything_starts(tmp_path: Path) -> None:
+    path = strided_plan(tmp_path)
+    cell = path.with_name("ur3-robotiq.cell.yaml")
+    cell.write_text(cell.read_text().replace("model: ur3,", "model: ur99,"))
+    with pytest.raises(InputError, match="ur99 is not known"):
+        RunningEstimate(read_plan(path), None, None)
