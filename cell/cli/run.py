@@ -83,6 +83,7 @@ def run(
     if not outcome.complete and result.finish is not Finish.BAD_INPUT:
         flags = {"--dry-run": dry_run, "--peers": peers, "--record-only": record_only}
         words = ["cell", "run", str(path), "-o", str(folder), *(f for f in flags if flags[f])]
+        words += [] if page is None else ["--page", page]
         say(f"when that is mended, go on with: {shlex.join(words)} --resume")
     raise typer.Exit(result.finish.exit_status)
 
