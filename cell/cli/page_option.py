@@ -17,10 +17,11 @@ class WithPage(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Give a bare `--page` its default address."""
-        return super().parse_args(ctx, list(_filled(args)))
+        return super().parse_args(ctx, list(with_addresses(args)))
 
 
-def _filled(words: list[str]) -> Iterator[str]:
+def with_addresses(words: list[str]) -> Iterator[str]:
+    """The words with an address behind every `--page`: the one that follows, or the default."""
     left = iter(words)
     for word in left:
         if word != NAME:
@@ -31,4 +32,4 @@ def _filled(words: list[str]) -> Iterator[str]:
             yield f"{NAME}={following}"
         else:
             yield f"{NAME}={DEFAULT}"
-            yield from () if following is None else _filled([following, *left])
+            yield from () if following is None else with_addresses([following, *left])

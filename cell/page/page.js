@@ -192,7 +192,7 @@ function showEstimate(part) {
     const rows = part.by_distance;
     const worst = Math.max(...rows.map((row) => row[2]));
     const goal = part.goal_px ? `; goal ${part.goal_px} px: ${worst <= part.goal_px ? "reached ✓" : "not reached yet"}` : "";
-    put("estimate", `${worst.toPrecision(2)} px at worst, from ${rows[0][0].toFixed(2)} to ` +
+    put("estimate", `${worst.toPrecision(3)} px at worst, from ${rows[0][0].toFixed(2)} to ` +
       `${rows[rows.length - 1][0].toFixed(2)} m, after ${part.used} frames${goal}`);
     const few = part.min_views && part.used < part.min_views ? [`${part.min_views} frames`] : [];
     const lacks = [...few, ...part.lacks];

@@ -15,9 +15,12 @@ from urllib.parse import urlsplit
 import cv2
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from cell.cli.app import app
+from cell.cli.page_option import with_addresses
 from cell.errors import EXIT_OPERATOR, InputError
-from cell.page.address import Address, is_address
+from cell.page.address import DEFAULT, Address, is_address
 from cell.page.application import MOST_STREAMS
 from cell.page.live_run import LiveRun
 from cell.page.picture import jpeg
@@ -63,6 +66,28 @@ def test_what_is_no_address_is_refused(text: str) -> None:
 def test_a_plan_is_not_taken_for_an_address() -> None:
     assert is_address("0.0.0.0:80")
     assert not is_address("configs/ur3-robotiq.plan.yaml")
+
+
+@pytest.mark.parametrize(
+    ("words", "filled"),
+    [
+        (["p.yaml", "--page"], ["p.yaml", f"--page={DEFAULT}"]),
+        (["--page", "p.yaml", "--json"], [f"--page={DEFAULT}", "p.yaml", "--json"]),
+        (["--page", "0.0.0.0:80", "p.yaml"], ["--page=0.0.0.0:80", "p.yaml"]),
+        (["--page=[::1]:80", "p.yaml"], ["--page=[::1]:80", "p.yaml"]),
+        (["--page", "--page", "a:1"], [f"--page={DEFAULT}", "--page=a:1"]),
+    ],
+)
+def test_the_address_may_be_left_out(words: list[str], filled: list[str]) -> None:
+    assert list(with_addresses(words)) == filled
+
+
+def test_a_bad_address_touches_no_recording(tmp_path: Path) -> None:
+    plan = plan_of(tmp_path)
+    words = ["run", str(plan.path), "--dry-run", "-o", str(tmp_path / "run")]
+    said = CliRunner().invoke(app, [*words, "--page=somewhere"])
+    assert isinstance(said.exception, InputError)
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_taken_port_is_told(url: str) -> None:
