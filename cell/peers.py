@@ -98,7 +98,7 @@ def _serve(
         signal.signal(number, signal.SIG_IGN)
     _compile(cell)
     with ExitStack() as stack:
-        simulated, source = build(cell, WallClock())
+        simulated, source = build(cell, WallClock(), render_ahead=True)
         try:
             wires = Wires(
                 _arm_peer(stack, arm, simulated, cell, address),

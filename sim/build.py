@@ -8,8 +8,10 @@ from sim.cell import ARM_STREAM, SimulatedCell
 from sim.clock import Clock
 
 
-def build(cell: SimulatedCell, clock: Clock) -> tuple[SimArm, SimCamera]:
-    """Arm and camera that live by one clock; neither is connected yet."""
+def build(
+    cell: SimulatedCell, clock: Clock, *, render_ahead: bool = False
+) -> tuple[SimArm, SimCamera]:
+    """Arm and camera that live by one clock; neither is connected yet. See `SimCamera`."""
     arm = SimArm(
         cell.kinematics,
         clock,
@@ -17,4 +19,4 @@ def build(cell: SimulatedCell, clock: Clock) -> tuple[SimArm, SimCamera]:
         repeatability=cell.repeatability,
         rng=cell.random(ARM_STREAM),
     )
-    return arm, SimCamera(cell, arm, clock)
+    return arm, SimCamera(cell, arm, clock, render_ahead=render_ahead)

@@ -60,20 +60,26 @@ class SimCamera:
         Whose flange it rides on, or whose flange carries the board.
     clock:
         The time it shares with the arm.
+    render_ahead:
+        Render while the lens still moves, for a clock that goes on meanwhile: light needs no time
+        to compute a picture. Where the arm or the lens is elsewhere then, it is rendered anew.
     """
 
     tried_on_hardware = False
 
-    def __init__(self, cell: SimulatedCell, arm: KnowsItsTruth, clock: Clock) -> None:
+    def __init__(
+        self, cell: SimulatedCell, arm: KnowsItsTruth, clock: Clock, *, render_ahead: bool = False
+    ) -> None:
         self.faults = CameraFaults()
         self._cell, self._arm, self._clock = cell, arm, clock
+        self._render_ahead = render_ahead
+        self._rendered: tuple[bytes, Image] | None = None
         self._rng = cell.random(SENSOR_STREAM)
         self._connected_s: float | None = None
         self._exposure_s = 0.8 * cell.camera.sensor.white_exposure_s
         self._gain_db = 0.0
         self._focus_distance_m = cell.camera.focus_distance_m
-        self._rows: list[Row] = []
-        self._errors: list[FloatArray] = []
+        self._seen: list[tuple[Row, FloatArray]] = []  # effects with a memory need them all
 
     # -- the protocol ------------------------------------------------------------------------
 
@@ -112,8 +118,11 @@ class SimCamera:
                     f"simulated camera: its lens is {spec.focus} and cannot focus by itself; "
                     "use focus: hold in the plan"
                 )
-            self._clock.sleep(FOCUSING_S)
+            began_s = self._clock.now()
             self._focus_distance_m = self._focused(setting)
+            if self._render_ahead:
+                self._picture(*self._look([self._seen_now()]))
+            self._clock.sleep(began_s + FOCUSING_S - self._clock.now())
         return self._focus_position()
 
     def grab(self, timeout_s: float) -> Frame:
@@ -125,10 +134,10 @@ class SimCamera:
             raise FrameLost(f"simulated camera: no frame within {timeout_s} s")
         self._clock.sleep(0.5 * self._exposure_s)
         middle_s = self._clock.now()
-        self._note(middle_s)
-        reflectance = self._picture(*self._look())
-        self._clock.sleep(0.5 * self._exposure_s + READOUT_S)
-        return self._frame(reflectance, middle_s)
+        self._seen.append(self._seen_now())
+        frame = self._frame(self._picture(*self._look()), middle_s)
+        self._clock.sleep(middle_s + 0.5 * self._exposure_s + READOUT_S - self._clock.now())
+        return frame
 
     def close(self) -> None:
         """Let go."""
@@ -157,11 +166,12 @@ class SimCamera:
 
     def _distance_m(self) -> float:
         """Depth of the board's centre as the arm stands now."""
+        return float(self._walk([self._seen_now()])[1].distance_m[-1])
+
+    def _seen_now(self) -> tuple[Row, FloatArray]:
+        """The arm as it stands, and its flange's error."""
         truth = self._arm.truth()
-        row = self._row(truth, self._clock.now())
-        views = views_of(self._cell, [*self._rows, row])
-        errors = np.array([*self._errors, truth.flange_error])
-        return float(walk(self._cell.model, views, flange_error=errors).distance_m[-1])
+        return self._row(truth, self._clock.now()), truth.flange_error
 
     def _row(self, truth: ArmTruth, t_s: float) -> Row:
         return Row(
@@ -172,16 +182,15 @@ class SimCamera:
             self._exposure_s,
         )
 
-    def _note(self, t_s: float) -> None:
-        """Effects with a memory need to know every frame before this one."""
-        truth = self._arm.truth()
-        self._rows.append(self._row(truth, t_s))
-        self._errors.append(truth.flange_error)
+    def _walk(self, more: list[tuple[Row, FloatArray]]) -> tuple[Views, Walk]:
+        """The chain over every frame so far and `more`."""
+        seen = [*self._seen, *more]
+        views = views_of(self._cell, [row for row, _ in seen])
+        errors = np.array([error for _, error in seen])
+        return views, walk(self._cell.model, views, flange_error=errors)
 
-    def _look(self) -> tuple[Walk, FloatArray]:
-        views = views_of(self._cell, self._rows)
-        errors = np.array(self._errors)
-        state = walk(self._cell.model, views, flange_error=errors)
+    def _look(self, more: list[tuple[Row, FloatArray]] | None = None) -> tuple[Walk, FloatArray]:
+        views, state = self._walk(more or [])
         focus = self._focus_distance_m
         if focus is None or abs(focus - state.distance_m[-1]) < 1e-6:
             return state, state.optics[-1]
@@ -190,15 +199,20 @@ class SimCamera:
     def _picture(self, state: Walk, optics: FloatArray) -> Image:
         spec = self._cell.camera
         focus = self._focus_distance_m or float(state.distance_m[-1])
-        return render(
-            self._cell.board,
-            state.points_m,
-            optics,
-            state.camera_from_board[-1],
-            width_px=spec.width_px,
-            height_px=spec.height_px,
-            blur=Blur(spec.aperture_m, focus, spec.lens_sigma_px),
-        )
+        pose = state.camera_from_board[-1]
+        shown = b"".join(a.tobytes() for a in (state.points_m, optics, pose, np.array(focus)))
+        if self._rendered is None or self._rendered[0] != shown:
+            image = render(
+                self._cell.board,
+                state.points_m,
+                optics,
+                pose,
+                width_px=spec.width_px,
+                height_px=spec.height_px,
+                blur=Blur(spec.aperture_m, focus, spec.lens_sigma_px),
+            )
+            self._rendered = shown, image
+        return self._rendered[1]
 
     def _frame(self, reflectance: Image, middle_s: float) -> Frame:
         image = expose(

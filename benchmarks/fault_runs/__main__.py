@@ -47,11 +47,15 @@ def trials_of(stand: Stand, folder: Path, fault: Fault, when: list[float]) -> li
     for number, instant_s in enumerate(when):
         if trials and trials[-1].frames > VIEWS // 2:
             folder = folder.with_name(f"{folder.name}-{number}")
-        trials.append(happening(stand, folder, fault, instant_s))
+        came = happening(stand, folder, fault, instant_s)
+        trials += [came] if came is not None else []
     return trials
 
 
 def _print(stand: str, fault: Fault, trials: list[Trial]) -> int:
+    if not trials:
+        print(f"| {stand} | {fault.name} | the machine was too busy | | | | |", flush=True)
+        return 1
     good = sum(not one.complaints for one in trials)
     moving = sum(one.moving for one in trials)
     worst_s = max(one.halted_s for one in trials)

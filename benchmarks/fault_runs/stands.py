@@ -44,7 +44,7 @@ class Stand:
     Attributes
     ----------
     plan:
-        Of `VIEWS` views around the cell's home, each a move of about half a second.
+        Of `VIEWS` views around the cell's home, each a move of a second or two.
     truth, sim:
         What the peers simulate, and the arm behind the controller.
     arm, camera:
@@ -120,6 +120,7 @@ def _plan(folder: Path, name: str, robot: dict[str, Any], camera: dict[str, Any]
         "name": "faults",
         "cell": "cell.yaml",
         "speed_m_s": 0.25,
+        "joint_speed_deg_s": 10.0,
         "exposure": {"focus": "auto", "timeout_s": 2.0},
         "views": views,
     }

@@ -215,7 +215,12 @@ class URArm:
             return DeviceRefused(self._named(why))
         if "No module named" in why:
             return DeviceRefused(self._named(f"{why}: pip install 'calibration-cell[ur]'"))
-        return DeviceUnreachable(self._named(f"cannot start the control script: {why}"))
+        return DeviceUnreachable(
+            self._named(
+                f"cannot start the control script: {why}. See whether the teach pendant shows an "
+                "error or somebody stopped the program there; then try again"
+            )
+        )
 
     def _await_no_program(self) -> None:
         # ur-rtde would end a program that is not ours without asking

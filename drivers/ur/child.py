@@ -20,7 +20,7 @@ from typing import Any, TextIO
 
 _PR_SET_PDEATHSIG = 1
 _FLAG_UPLOAD_SCRIPT, _FLAG_UPPER_RANGE, _FLAG_NO_EXT_FT = 0x01, 0x08, 0x40
-_CYCLE_S = 0.02
+_CYCLE_S = 0.01
 
 
 def main() -> None:

@@ -73,5 +73,7 @@ def _ended(runtime: Runtime) -> bool:
 def _gone(runtime: Runtime) -> str:
     return (
         f"the control program on the robot is {runtime.name.lower()}: somebody stopped it at the "
-        "teach pendant, another client took its place, or the watchdog ended it"
+        "teach pendant, another client took its place, or the watchdog ended it, having heard "
+        "nothing from here. Look at the pendant; check the network, and what else loads this "
+        "computer"
     )

@@ -138,7 +138,8 @@ class RobotiqPeer:
             new = self.settings.changed(wanted)
             self._source.configure(exposure_s=new.exposure_s, gain_db=new.gain_db)
             old, self.settings = self.settings, new
-            if _focus_of(new) != _focus_of(old):
+            begins = new.focuses_itself and not old.focuses_itself
+            if begins or new.values.get("focus") != old.values.get("focus"):
                 self._focus()
 
     def _focus(self) -> None:
@@ -160,10 +161,6 @@ class RobotiqPeer:
             )
         _, encoded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 95])
         return encoded.tobytes()
-
-
-def _focus_of(settings: Settings) -> dict[str, Any]:
-    return {name: value for name, value in settings.values.items() if name.startswith("focus")}
 
 
 class _Server(DroppableServer):
