@@ -10,6 +10,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ import pytest
 from distributed import LocalCluster
 
 from cell.cli.app import main
+from cell.doctor import examine
 from cell.errors import InputError
 from cell.files.plan_file import read_plan
 from cell.files.study_file import read_study
@@ -290,3 +293,19 @@ def test_without_the_extra_it_says_how_to_install_it(
     assert status == 3
     assert err.startswith(f"error: cell study needs {name} (")
     assert "pip install 'calibration-cell[study]'" in err
+
+
+def test_the_doctor_names_what_is_missing_and_does_not_mind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def version(name: str) -> str:
+        if name in extra.PACKAGES:
+            raise PackageNotFoundError(name)
+        return "1.0"
+
+    monkeypatch.setattr(import_module("cell.doctor.installed"), "version", version)
+    told = {finding.name: finding for finding in examine(None)}
+    for name in extra.PACKAGES:
+        assert not told[name].ready
+        assert not told[name].blocks
+        assert extra.MEND in told[name].line()
