@@ -216,8 +216,12 @@ def held_at(views: Views, scale: Mapping[str, float]) -> dict[str, Solution]:
     }
 
 
-@cache
 def run_named(cell: str, plan: str = AS_IN_THE_PAPER) -> Run:
-    """The run of a cell and one of its plans, both by name."""
+    """The run of a cell and one of its plans, both by name; each is made once."""
+    return _made(cell, plan)
+
+
+@cache
+def _made(cell: str, plan: str) -> Run:
     preset, plans = PLANS[cell]
     return run(preset(0), next(p for p in plans if p.name == plan))
