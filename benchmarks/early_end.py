@@ -1,9 +1,9 @@
 """How far off alpha is where a run ends early, beside the sigma it ended on.
 
-``python benchmarks/early_end.py [RUNS]`` simulates corners of the two shipped plans, half of the
-runs in the plan's own order and half with every third view first, estimates after every second
-frame, and ends each run as ``until: {alpha_sigma_px: 0.5}`` does. Beside it stands where a sigma
-alone would have ended it: that of a lens whose law is free only when the frames demand it.
+``python benchmarks/early_end.py [RUNS] [CELL ...]`` simulates corners of the shipped plans, half
+of the runs in the plan's own order and half with every third view first, estimates after every
+second frame, and ends each run as ``until: {alpha_sigma_px: 0.5}`` does. Beside it stands where a
+sigma alone would have ended it: that of a lens whose law is free only when the frames demand it.
 """
 
 from __future__ import annotations
@@ -100,18 +100,21 @@ def runs(name: str, count: int) -> Iterator[tuple[str, End | None, End | None]]:
             )
 
 
-def main(count: int) -> None:
+def main(count: int, cells: list[str]) -> None:
     print("| cell | order | ended by | runs | frames | worst error px | in sigmas |")
     print(7 * "|---" + "|")
-    for name in ("irb140-eosens", "ur3-robotiq"):
+    for name in cells:
         found = list(runs(name, count))
         for order in ("plan's", "every third"):
             for way, words in ((1, "until"), (2, "sigma alone")):
                 ends = [row[way] for row in found if row[0] == order and row[way] is not None]
+                if not ends:
+                    continue
                 frames, error, ratio = np.array(ends).T
                 told = f"{frames.min():.0f} to {frames.max():.0f} | {error.max():.2f}"
                 print(f"| {name} | {order} | {words} | {len(ends)} | {told} | {ratio.max():.1f} |")
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 6)
+    asked = sys.argv[1:]
+    main(int(asked[0]) if asked else 6, asked[1:] or ["irb140-eosens", "ur3-robotiq"])
