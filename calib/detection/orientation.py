@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from calib.chain.rigid import inverse
 from calib.detection.result import Detection, FloatArray
 from calib.views import Board, Mount
 
@@ -44,6 +45,11 @@ def possible_turns(board: Board) -> tuple[int, ...]:
 
 def _rough_rotations(corners_px: FloatArray, board: Board) -> Rotation:
     """camera_from_board rotations of N frames under rough intrinsics, which no turn changes."""
+    return _rough_poses(corners_px, board)[0]
+
+
+def _rough_poses(corners_px: FloatArray, board: Board) -> tuple[Rotation, FloatArray]:
+    """camera_from_board rotations of N frames, and (N, 3) where the board's centre is."""
     some = slice(None, None, -(-board.corner_count // _MOST_CORNERS))
     points = board.corners_m.astype(np.float32)[some]
     pixels = corners_px[:, some].astype(np.float32)
@@ -69,8 +75,10 @@ def _rough_rotations(corners_px: FloatArray, board: Board) -> Rotation:
             | cv2.CALIB_FIX_K2
             | cv2.CALIB_FIX_K3,
         )[1:3]
-    poses = [cv2.solvePnP(points, frame, K, distortion)[1].ravel() for frame in pixels]
-    return Rotation.from_rotvec(np.array(poses))
+    poses = [cv2.solvePnP(points, frame, K, distortion)[1:] for frame in pixels]
+    rotations = Rotation.from_rotvec(np.array([turn.ravel() for turn, _ in poses]))
+    origin = np.array([place.ravel() for _, place in poses])
+    return rotations, origin + rotations.apply(board.corners_m.mean(axis=0))
 
 
 def _quarter(turns: int | IntArray) -> Rotation:
@@ -186,6 +194,51 @@ def turns_to_agree(
     last = np.searchsorted(posed, np.arange(len(chosen)), side="right") - 1
     chosen = (chosen + shift[np.maximum(last, 0)]) % 4
     return np.asarray((chosen - chosen[0]) % 4)
+
+
+def pose_misfits(
+    corners_px: FloatArray,
+    board: Board,
+    readings: Sequence[FloatArray],
+    mount: Mount = "eye_in_hand",
+) -> FloatArray:
+    """(R, 2) how far each reading of the robot's poses is from what the pictures show.
+
+    By how much the frames miss a mount and a board that stand still, after the best ones were
+    solved for: the median angle in radians, and the places' RMS as a share of the way the flange
+    went. The camera's intrinsics are rough, and the poses may be of any unit.
+
+    Parameters
+    ----------
+    corners_px, board, mount:
+        As for `turns_to_agree`, N complete frames.
+    readings:
+        (N, 4, 4) base_from_flange, as each reading of the log has them.
+    """
+    turns = possible_turns(board)
+    camera, centre = _rough_poses(corners_px, board)
+    found = []
+    for reading in readings:
+        flange: FloatArray = reading if mount == "eye_in_hand" else inverse(reading)
+        robot = Rotation.from_matrix(flange[:, :3, :3])
+        one_way = np.zeros(len(corners_px), dtype=np.int64)
+        chosen = one_way if len(turns) == 1 else _turns_by_robot(robot, camera, turns)
+        turned = camera * _quarter(chosen)
+        X, W = _mount_and_board(robot, turned)
+        angle = float(np.median((W.inv() * robot * X * turned).magnitude()))
+        found.append((angle, _place_misfit(flange, X, centre)))
+    return np.array(found)
+
+
+def _place_misfit(flange: FloatArray, mount: Rotation, centre: FloatArray) -> float:
+    """RMS of F_i (X s c_i + x) - w over the scatter of the flange's places; x, w, s solved for."""
+    n, R, went = len(flange), flange[:, :3, :3], flange[:, :3, 3]
+    scaled = (R @ mount.apply(centre)[:, :, None])[:, :, 0]
+    A = np.concatenate([R, -np.tile(np.eye(3), (n, 1, 1)), scaled[:, :, None]], axis=2)
+    A, b = A.reshape(3 * n, 7), -went.ravel()
+    left = A @ np.linalg.lstsq(A, b, rcond=None)[0] - b
+    way = float(np.linalg.norm(went - went.mean(axis=0)))
+    return float(np.linalg.norm(left)) / max(way, 1e-12)
 
 
 def orient(

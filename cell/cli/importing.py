@@ -33,8 +33,12 @@ def import_(
     ] = None,
     unit: Annotated[Unit | None, typer.Option(help="Unit of the poses' positions.")] = None,
     inverted: Annotated[
-        bool, typer.Option("--inverted", help="The poses are flange_from_base.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--inverted/--not-inverted",
+            help="The poses are flange_from_base; where nothing is said, the pictures are asked.",
+        ),
+    ] = None,
     mount: Annotated[Mount, typer.Option(help="Where the camera sits.")] = "eye_in_hand",
     robot: Annotated[str | None, typer.Option(help="The arm's model, such as ur5e.")] = None,
     as_json: JsonFlag = False,

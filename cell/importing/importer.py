@@ -11,13 +11,15 @@ from typing import Any
 import cv2
 import numpy as np
 
-from calib.views import Mount
+from calib.detection.orientation import pose_misfits
+from calib.views import Board, FloatArray, Mount
 from cell.calibrate import Progress, detect_corners
 from cell.errors import BadAnswer, InputError
 from cell.importing import RotationName, Unit
-from cell.importing.conventions import Convention, conclude
+from cell.importing.conventions import Convention, Witness, conclude
 from cell.importing.pose_files import RawPose, natural, number_in, read_poses
 from cell.recording import (
+    Corners,
     FrameRecord,
     Header,
     PoseRecord,
@@ -28,6 +30,7 @@ from cell.recording import (
 )
 from cell.recording.corners import FILE_NAME as DETECTIONS
 
+_ENOUGH_TO_ASK = 4
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".webp")
 
 
@@ -42,7 +45,8 @@ class Described:
     poses:
         File or folder of the poses; None: pictures alone.
     rotation, unit, inverted:
-        How poses are written; `inverted`: they are flange_from_base.
+        How poses are written; `inverted`: they are flange_from_base. None where not said: then
+        the pictures are asked.
     mount, robot, name:
         For `recording.yaml`.
     """
@@ -51,7 +55,7 @@ class Described:
     poses: Path | None = None
     rotation: RotationName | None = None
     unit: Unit | None = None
-    inverted: bool = False
+    inverted: bool | None = None
     mount: Mount = "eye_in_hand"
     robot: str | None = None
     name: str | None = None
@@ -90,16 +94,18 @@ def import_source(
     BadAnswer
         The board was found in no picture.
     """
+    guessed: tuple[str, ...] = ()
+    corners = None
     if (source / "recording.yaml").exists():
-        guessed = _copy_recording(read_recording(source), folder)
+        _copy_recording(read_recording(source), folder)
     elif source.is_dir():
-        guessed = _import_pictures(source, folder, described)
+        guessed, corners = _import_pictures(source, folder, described, progress)
     else:
         raise InputError(f"{source}: is no folder of pictures and no recording")
-    return _find_corners(read_recording(folder), guessed, progress)
+    return _find_corners(read_recording(folder), guessed, corners, progress)
 
 
-def _copy_recording(recording: Recording, folder: Path) -> tuple[str, ...]:
+def _copy_recording(recording: Recording, folder: Path) -> None:
     """Copy a recording, checked: pictures as they are, every line whole."""
     with RecordingWriter.create(folder, recording.header) as writer:
         for frame in recording.frames:
@@ -109,10 +115,12 @@ def _copy_recording(recording: Recording, folder: Path) -> tuple[str, ...]:
             writer.append(frame)
     if recording.has_detections:
         write_corners(folder / DETECTIONS, recording.detections(), recording.board)
-    return ()
 
 
-def _import_pictures(source: Path, folder: Path, described: Described) -> tuple[str, ...]:
+def _import_pictures(
+    source: Path, folder: Path, described: Described, progress: Progress | None
+) -> tuple[tuple[str, ...], Corners | None]:
+    """What was concluded and not said, and the corners where the pictures were asked."""
     pictures = sorted(
         (path for path in source.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES), key=natural
     )
@@ -124,15 +132,48 @@ def _import_pictures(source: Path, folder: Path, described: Described) -> tuple[
             " as --board 6x9x0.025"
         )
     poses = [] if described.poses is None else read_poses(described.poses)
-    convention = conclude(poses, described.rotation, described.unit) if poses else None
     pairs = _pairs(pictures, poses)
-    header = _header(source, pictures, described, convention)
+    header = _header(source, pictures, described)
+    convention, corners = None, None
+    if poses:
+        corners = _corners_of(source, header, pictures, progress)
+        witness = _witness(pairs, corners, header.board.board(), described.mount)
+        asked = [pose for _, pose in pairs if pose is not None]
+        said = (described.rotation, described.unit, described.inverted)
+        convention = conclude(asked, *said, witness)
+        header = header.model_copy(update={"imported": _told(header, convention)})
     with RecordingWriter.create(folder, header) as writer:
         for frame, (picture, pose) in enumerate(pairs):
             name = f"images/{frame:05d}{picture.suffix.lower()}"
             shutil.copy2(picture, folder / name)
-            writer.append(_frame(frame, name, picture, pose, convention, described.inverted))
-    return () if convention is None else convention.guessed
+            writer.append(_frame(frame, name, picture, pose, convention))
+    return () if convention is None else convention.guessed, corners
+
+
+def _corners_of(
+    source: Path, header: Header, pictures: Sequence[Path], progress: Progress | None
+) -> Corners:
+    frames = [FrameRecord(frame=k, image=picture.name) for k, picture in enumerate(pictures)]
+    return detect_corners(Recording(source, header, tuple(frames)), progress)
+
+
+def _witness(
+    pairs: Sequence[tuple[Path, RawPose | None]], corners: Corners, board: Board, mount: Mount
+) -> Witness | None:
+    """What the whole boards among the pictures say of a reading of the poses."""
+    posed = [k for k, (_, pose) in enumerate(pairs) if pose is not None]
+    whole = [
+        k for k, frame in enumerate(posed)
+        if frame in corners.px and np.isfinite(corners.px[frame]).all()
+    ]  # fmt: skip
+    if len(whole) < _ENOUGH_TO_ASK:
+        return None
+    seen = np.array([corners.px[posed[k]] for k in whole])
+
+    def misfits(readings: Sequence[FloatArray]) -> FloatArray:
+        return pose_misfits(seen, board, [reading[whole] for reading in readings], mount)
+
+    return misfits
 
 
 def _pairs(pictures: Sequence[Path], poses: Sequence[RawPose]) -> list[tuple[Path, RawPose | None]]:
@@ -150,9 +191,7 @@ def _pairs(pictures: Sequence[Path], poses: Sequence[RawPose]) -> list[tuple[Pat
     return list(zip(pictures, poses, strict=True))
 
 
-def _header(
-    source: Path, pictures: Sequence[Path], described: Described, convention: Convention | None
-) -> Header:
+def _header(source: Path, pictures: Sequence[Path], described: Described) -> Header:
     height, width = _size(pictures)
     data: dict[str, Any] = {
         "schema": "cell.recording/1",
@@ -164,10 +203,14 @@ def _header(
         "images": "images/",
         "imported": {"from": str(source), "poses": str(described.poses or "none")},
     }
-    if convention is not None:
-        data["imported"] |= {"rotation": convention.rotation, "unit": convention.unit}
-        data["imported"]["guessed"] = list(convention.guessed)
     return Header.model_validate(data)
+
+
+def _told(header: Header, convention: Convention) -> dict[str, Any]:
+    """What `recording.yaml` says of where the recording came from."""
+    known = dict((header.model_extra or {})["imported"])
+    known |= {"rotation": convention.rotation, "unit": convention.unit}
+    return known | {"inverted": convention.inverted, "guessed": list(convention.guessed)}
 
 
 def _size(pictures: Sequence[Path]) -> tuple[int, int]:
@@ -185,22 +228,23 @@ def _frame(
     picture: Path,
     pose: RawPose | None,
     convention: Convention | None,
-    inverted: bool,
 ) -> FrameRecord:
     values: dict[str, Any] = {"frame": frame, "image": name, "source": picture.name}
     if pose is not None and convention is not None:
-        transform = convention.transform(pose)
-        values["base_from_flange"] = PoseRecord.of(transform.inv() if inverted else transform)
+        values["base_from_flange"] = PoseRecord.of(convention.transform(pose))
     return FrameRecord.model_validate(values)
 
 
 def _find_corners(
-    recording: Recording, guessed: tuple[str, ...], progress: Progress | None
+    recording: Recording,
+    guessed: tuple[str, ...],
+    corners: Corners | None,
+    progress: Progress | None,
 ) -> Imported:
     if recording.has_detections:
         corners = recording.detections()
     else:
-        corners = detect_corners(recording, progress)
+        corners = detect_corners(recording, progress) if corners is None else corners
         write_corners(recording.path / DETECTIONS, corners, recording.board)
     if not corners.px:
         reasons = "".join(

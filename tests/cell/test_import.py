@@ -94,7 +94,7 @@ def test_a_folder_of_one_pose_a_file_in_natural_order(tmp_path: Path) -> None:
     ("text", "message"),
     [
         (words(np.concatenate([P_M, TURN.as_quat()])), "x y z w or w x y z"),
-        (words(np.concatenate([P_M, TURN.as_rotvec()])), "rotation vector or angles"),
+        (words(np.concatenate([P_M, TURN.as_rotvec()])), r"rotation vector \(UR\) or angles"),
         ("1 2 3\n", "has 3 numbers"),
         ("nothing\n", "holds no pose"),
         (words(MATRIX.ravel()) + "\n" + words(MATRIX[:3].ravel()), "poses of 12 and 16 numbers"),
