@@ -20,8 +20,9 @@ Witness = Callable[[Sequence[FloatArray]], FloatArray]
 _FARTHEST_M = 4.0
 """No arm this program knows reaches farther; larger numbers are millimetres."""
 
-_GOOD = 0.06
-"""Radians, or share of the flange's way, that rough intrinsics and a poor arm may make."""
+_GOOD = np.array([0.06, 0.3])
+"""Radians, and share of the flange's way, that rough intrinsics and a poor arm may make: a wrong
+reading is off by half the way and more."""
 
 _TELLS_APART = 3.0
 """A reading counts as decided when the next best is so many times worse."""
@@ -184,7 +185,7 @@ def _decide(
     rivals = [readings[k] for k in order[1:] if size[k] < _TELLS_APART * least]
     angle, share = misfits[order[0]]
     off = f"{np.degrees(angle):.2f} degrees, places to {1e2 * share:.1f} % of the way"
-    if size[order[0]] > _GOOD:
+    if (misfits[order[0]] > _GOOD).any():
         if len(readings) == 1:
             return (*best, (f"BUT THE PICTURES SPEAK AGAINST IT: turns agree only to {off}",))
         raise InputError(
