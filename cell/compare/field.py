@@ -68,7 +68,7 @@ def _rays(side: Side, pixels: FloatArray, distance_m: float) -> FloatArray:
     u0, v0, skew, *fitted = side.values[3 : PLACE.start]
     y = (pixels[:, 1] - v0) / beta
     x = (pixels[:, 0] - u0 - skew * y) / alpha
-    coefficients = np.array([*fitted, *side.more_distortion.values()])
+    coefficients = np.array(fitted)
     enough = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-14)
     ideal = cv2.undistortPointsIter(
         np.stack([x, y], axis=1)[:, None], np.eye(3), coefficients, np.eye(3), np.eye(3), enough

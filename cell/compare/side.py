@@ -21,10 +21,7 @@ from cell.export.reading import (
     TransformSource,
 )
 
-FITTED_DISTORTION = DISTORTION[:5]
-"""The coefficients that a calibration may free: k1, k2, p1, p2, k3."""
-
-OPTICS_NAMES = ("alpha", "beta", "bend", "u0_px", "v0_px", "skew_px", *FITTED_DISTORTION)
+OPTICS_NAMES = ("alpha", "beta", "bend", "u0_px", "v0_px", "skew_px", *DISTORTION)
 NAMES = (*OPTICS_NAMES, *(f"mount.{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")))
 """Alpha and beta far away, the focus law's bend, then the camera's place by a small increment in
 its own frame."""
@@ -55,8 +52,6 @@ class Side:
         (P,) and (P, P) of `NAMES`.
     correlated:
         False where only single sigmas are known.
-    more_distortion:
-        Coefficients beyond `FITTED_DISTORTION`, held.
     place_name, place:
         `flange_from_camera` or `base_from_camera` and its (4, 4); empty and None where unknown.
     has_corner:
@@ -72,7 +67,6 @@ class Side:
     values: FloatArray
     covariance: FloatArray
     correlated: bool
-    more_distortion: dict[str, float]
     place_name: str
     place: FloatArray | None
     has_corner: bool
@@ -93,7 +87,7 @@ class Side:
         """(K,) of the camera focused at a distance."""
         alpha, beta = self.scale_px(values, distance_m)
         named = dict(zip(OPTICS_NAMES[3:], values[3 : PLACE.start], strict=True))
-        return optics_row(alpha_px=alpha, beta_px=beta, **named, **self.more_distortion)
+        return optics_row(alpha_px=alpha, beta_px=beta, **named)
 
     def pixels(
         self, values: FloatArray, points_m: FloatArray, distance_m: float, place: FloatArray
@@ -128,7 +122,6 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
     place_name = next((n for n in _PLACES if getattr(calibration, n) is not None), "")
     place: TransformSource | None = getattr(calibration, place_name) if place_name else None
     covariance, correlated = _covariance(solution, law, place, place_name)
-    held = len(FITTED_DISTORTION)
     return Side(
         label=label,
         recording=calibration.recording,
@@ -139,7 +132,6 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
         values=_values(solution, law),
         covariance=covariance,
         correlated=correlated,
-        more_distortion=dict(zip(DISTORTION[held:], solution.distortion[held:], strict=True)),
         place_name=place_name,
         place=None if place is None else place.matrix,
         has_corner=law is not None and zones is not None and zones.method == "change_point",
@@ -153,8 +145,7 @@ def _values(solution: SolutionSource, law: LawSource | None) -> FloatArray:
         named = {_ALIASES.get(n): p.value for n, p in law.parameters.items()}
         beta = named.get("beta", alpha * solution.beta_px / told)
     optics = [solution.u0_px, solution.v0_px, solution.skew_px]
-    fitted = solution.distortion[: len(FITTED_DISTORTION)]
-    return np.array([alpha, beta, bend, *optics, *fitted, *np.zeros(6)])
+    return np.array([alpha, beta, bend, *optics, *solution.distortion, *np.zeros(6)])
 
 
 def _covariance(

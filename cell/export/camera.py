@@ -22,7 +22,7 @@ class Camera:
     alpha_px, beta_px, u0_px, v0_px:
         Focal lengths and principal point, (0, 0) at the centre of the top-left pixel.
     distortion:
-        (12,) `cell.export.reading.DISTORTION`.
+        (14,) `cell.export.reading.DISTORTION`.
     about:
         What it is and where it came from, one line, for a comment in the file.
     """

@@ -16,7 +16,10 @@ from cell.files.yaml_model import read_model
 from cell.report.data import PREFERENCE
 
 SCHEMA = "cell.calibration/1"
-DISTORTION = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4")
+DISTORTION = (
+    *("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+    *("s1", "s2", "s3", "s4", "tilt_x_rad", "tilt_y_rad"),
+)
 """Coefficients in OpenCV's order, which ROS, mrcal and COLMAP share as far as they go."""
 
 
@@ -80,6 +83,8 @@ class SolutionSource(_Part):
     s2: float = 0.0
     s3: float = 0.0
     s4: float = 0.0
+    tilt_x_rad: float = 0.0
+    tilt_y_rad: float = 0.0
     at_distance_m: float | None = None
     focus: LawSource | None = None
     sigma: dict[str, float] = {}
@@ -87,7 +92,7 @@ class SolutionSource(_Part):
 
     @property
     def distortion(self) -> tuple[float, ...]:
-        """The twelve coefficients of `DISTORTION`."""
+        """The fourteen coefficients of `DISTORTION`."""
         return tuple(float(getattr(self, name)) for name in DISTORTION)
 
 

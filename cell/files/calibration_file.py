@@ -149,9 +149,18 @@ class SolutionPart(_Part):
     k1: float
     k2: float
     p1: float = 0.0
-    """Decentering and the third radial term: given where the pictures deserve them."""
+    """Decentering and all that follow: given where the pictures deserve them."""
     p2: float = 0.0
     k3: float = 0.0
+    k4: float = 0.0
+    k5: float = 0.0
+    k6: float = 0.0
+    s1: float = 0.0
+    s2: float = 0.0
+    s3: float = 0.0
+    s4: float = 0.0
+    tilt_x_rad: float = 0.0
+    tilt_y_rad: float = 0.0
     at_distance_m: float | None
     """Where alpha and beta move with distance: the distance they are told at."""
     focus: FocusPart | None = None

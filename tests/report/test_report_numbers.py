@@ -59,7 +59,8 @@ def test_a_probability(p: float | None, shown: str) -> None:
         ("rad_per_g", "size"),
         ("relative", "relative"),
         ("k3", "k₃"),
-        ("k4", "k4"),
+        ("k4", "k₄"),
+        ("q7", "q7"),
     ],
 )
 def test_a_parameter_in_words(key: str, shown: str) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from calib.calibration import calibrate
+from calib.calibration.joint_lens import FURTHER_NAMES
 from calib.chain.optics import COLUMN
 from calib.chain.projection import project
 from calib.views import FloatArray, Mount
@@ -64,3 +65,30 @@ def test_terms_that_the_lens_has_are_freed_and_no_others() -> None:
     for name, value in (("p1", 4e-4), ("p2", -3e-4)):
         assert abs(joint.values[name] - value) < 4 * joint.sigma[name]
         assert joint.sigma[name] < 2e-5
+
+
+def _bent(terms: dict[str, float]) -> Scene:
+    """The unit-focusing cell with more distortion."""
+    true = _unit_focusing("eye_in_hand", 3)
+    optics = true.optics.copy()
+    for name, value in terms.items():
+        optics[:, COLUMN[name]] = value
+    plain = project(true.optics, true.camera_from_board, BOARD.corners_m)
+    true.views.corners_px[:] += project(optics, true.camera_from_board, BOARD.corners_m) - plain
+    return true
+
+
+def test_a_tilted_sensor_is_told_from_decentering() -> None:
+    tilt = {"tilt_x_rad": 0.06, "tilt_y_rad": -0.08}
+    joint = calibrate(_bent(tilt).views).solutions["joint_ml"]
+    assert set(joint.values) & set(FURTHER_NAMES) == set(tilt)
+    for name, value in tilt.items():
+        assert abs(joint.values[name] - value) < 4 * joint.sigma[name]
+        assert joint.sigma[name] < 1e-3
+
+
+def test_rational_terms_are_freed_where_a_polynomial_does_not_do() -> None:
+    rational = {"k1": 8.0, "k2": 2.0, "k4": 8.2, "k5": 4.0}
+    joint = calibrate(_bent(rational).views).solutions["joint_ml"]
+    assert {"k4", "k5", "k6"} <= set(joint.values)
+    assert joint.reprojection_px["rms"] < 0.072

@@ -7,7 +7,7 @@ import numpy as np
 
 from cell.export.camera import Camera
 
-LENGTHS = (5, 8, 12)
+LENGTHS = (5, 8, 12, 14)
 
 
 def text(camera: Camera) -> str:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from calib.calibration.joint_lens import FURTHER_NAMES
 from cell.report import html
 from cell.report.data import ReportData
 from cell.report.numbers import UNKNOWN, number, plus_minus, solution_name, symbol
 
 _PARAMETERS = ("alpha_px", "beta_px", "u0_px", "v0_px", "skew_px", "k1", "k2")
-_WHERE_FREED = ("p1", "p2", "k3")
+_WHERE_FREED = FURTHER_NAMES
 
 
 def tables(data: ReportData) -> str:
