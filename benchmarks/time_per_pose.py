@@ -14,14 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from calib.chain.kinematics import ArmKinematics
-from calib.views import FloatArray
 from cell.files.plan_file import Plan, read_plan
+from cell.planning.duration import move_s
 from cell.recording import FrameRecord, read_recording
 from cell.sequencer.guard import Guard
-from sim.arm import ACCELERATION_RAD_S2, SETTLE_S
+from sim.arm import SETTLE_S
 from sim.camera import FOCUSING_S
-from sim.motion import plan_move
 
 
 def main() -> None:
@@ -49,7 +47,7 @@ def _row(
     """Seconds from one frame to the next, and the least they could be."""
     here, there = (np.array(frame.joints_rad) for frame in (before, after))
     exposure = plan.file.exposure
-    bound_s = _move_s(guard, guard.kinematics, here, there) + SETTLE_S
+    bound_s = move_s(guard, here, there) + SETTLE_S
     bound_s += plan.file.settle.still_s + float(after.exposure_s) + transfer_s
     bound_s += FOCUSING_S if exposure.focus == "auto" else 0.0
     return after.t_s - before.t_s, bound_s
@@ -62,20 +60,6 @@ def _picture_s(frame: FrameRecord, transfer_s: float) -> float:
     return (
         0.0 if ordered_s is None else raw["arrived_s"] - ordered_s - frame.exposure_s - transfer_s
     )
-
-
-def _move_s(guard: Guard, kinematics: ArmKinematics, here: FloatArray, there: FloatArray) -> float:
-    target = guard.target(here, there, "between two frames")
-    move = plan_move(
-        kinematics,
-        here,
-        there,
-        0.0,
-        flange_speed_m_s=target.tcp_speed_m_s,
-        joint_speed_rad_s=target.joint_speed_rad_s,
-        acceleration_rad_s2=ACCELERATION_RAD_S2,
-    )
-    return move.profile.duration_s
 
 
 if __name__ == "__main__":

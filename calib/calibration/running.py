@@ -15,14 +15,13 @@ import numpy as np
 from calib.calibration.baseline import fit_baseline
 from calib.calibration.frames import usable_frames
 from calib.calibration.pipeline import robot_after
-from calib.calibration.uncertainty import optics_at
+from calib.calibration.uncertainty import focal_length_sigma_px, optics_at
 from calib.chain.effects import make_effect
-from calib.chain.model import CellModel
 from calib.chain.optics import COLUMN
 from calib.errors import CalibrationError
 from calib.handeye import chain
 from calib.solver.joint import JointFit, fit_joint
-from calib.solver.unknowns import PLAIN_OPTICS, moved, unknowns_of
+from calib.solver.unknowns import PLAIN_OPTICS, unknowns_of
 from calib.views import BoolArray, FloatArray, Views
 
 _LAW = "inverse_square"
@@ -59,21 +58,9 @@ class RunningFit:
 
         The fit's whole covariance, carried to first order.
         """
-        joint = self.joint
-        columns = []
-        for k, sigma in enumerate(np.sqrt(np.diag(joint.covariance))):
-            step = np.zeros(len(joint.unknowns))
-            step[k] = _STEP_SIGMA * sigma
-            ahead, behind = (moved(joint.model, joint.unknowns, s) for s in (step, -step))
-            rise = self._alpha_px(ahead, distance_m) - self._alpha_px(behind, distance_m)
-            columns.append(rise / (2 * step[k]))
-        change = np.stack(columns, axis=1)
-        variance = np.einsum("dp,pq,dq->d", change, joint.covariance, change)
-        return self._alpha_px(joint.model, distance_m), np.sqrt(np.maximum(variance, 0.0))
-
-    def _alpha_px(self, model: CellModel, distance_m: FloatArray) -> FloatArray:
         at = COLUMN["alpha_px"]
-        return np.array([optics_at(model, self.views, float(d))[at] for d in distance_m])
+        alpha = [optics_at(self.joint.model, self.views, float(d))[at] for d in distance_m]
+        return np.array(alpha), focal_length_sigma_px(self.joint, self.views, distance_m)
 
 
 def fit_so_far(views: Views, *, lens_moves: bool) -> RunningFit:

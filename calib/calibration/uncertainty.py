@@ -8,23 +8,40 @@ what the model leaves out come on top.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calib.calibration.made_views import views_that_see
 from calib.chain import rigid
 from calib.chain.model import CellModel, predict, walk
+from calib.chain.optics import COLUMN
 from calib.chain.projection import project_with_jacobians
-from calib.solver.joint import JointFit
-from calib.solver.unknowns import moved
-from calib.views import Board, FloatArray, Views
+from calib.solver.unknowns import Unknown, moved
+from calib.views import Board, BoolArray, FloatArray, Views
 
 _COLUMNS, _ROWS, _DISTANCES = 5, 3, 4
 _EDGE = 0.1
 _PART_OF_IMAGE = 0.2
 _STEP_SIGMA = 0.1
+
+
+class Estimate(Protocol):
+    """A cell with the p numbers that are uncertain in it: a joint fit, or one to be expected."""
+
+    @property
+    def model(self) -> CellModel:
+        """The cell."""
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What was, or will be, free."""
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(p, p) of the unknowns."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +69,7 @@ class UncertaintyMap:
 
 
 def uncertainty_map(
-    joint: JointFit, views: Views, distance_range_m: tuple[float, float]
+    joint: Estimate, views: Views, distance_range_m: tuple[float, float]
 ) -> UncertaintyMap:
     """The uncertainty on a small grid over the image and the range of distances.
 
@@ -63,10 +80,7 @@ def uncertainty_map(
     distance_range_m:
         Nearest and farthest depth.
     """
-    u = np.linspace(_EDGE, 1 - _EDGE, _COLUMNS) * views.width_px
-    v = np.linspace(_EDGE, 1 - _EDGE, _ROWS) * views.height_px
-    pixels = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
-    distances = np.geomspace(*distance_range_m, _DISTANCES)
+    pixels, distances = grid_px(views), grid_m(distance_range_m)
     return UncertaintyMap(
         distances,
         pixels,
@@ -76,8 +90,20 @@ def uncertainty_map(
     )
 
 
+def grid_px(views: Views) -> FloatArray:
+    """(G, 2) places all over the image."""
+    u = np.linspace(_EDGE, 1 - _EDGE, _COLUMNS) * views.width_px
+    v = np.linspace(_EDGE, 1 - _EDGE, _ROWS) * views.height_px
+    return np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+
+
+def grid_m(distance_range_m: tuple[float, float]) -> FloatArray:
+    """(D,) depths, closer together where they are near."""
+    return np.asarray(np.geomspace(*distance_range_m, _DISTANCES))
+
+
 def projection_sigma_px(
-    joint: JointFit, views: Views, pixels_px: FloatArray, distance_m: FloatArray
+    joint: Estimate, views: Views, pixels_px: FloatArray, distance_m: FloatArray
 ) -> FloatArray:
     """How far off the camera may predict where a thing appears that the robot has the place of.
 
@@ -92,17 +118,38 @@ def projection_sigma_px(
     -------
     (D, G, 2) one sigma along u and v, pixels.
     """
+    return _sigma(projection_change_px(joint, views, pixels_px, distance_m), joint.covariance)
+
+
+def projection_change_px(
+    joint: Estimate, views: Views, pixels_px: FloatArray, distance_m: FloatArray
+) -> FloatArray:
+    """(D, G, 2, p) of those pixels, by each of the p numbers; see `projection_sigma_px`."""
     out = []
     for d in distance_m:
         part, _ = _part(joint, views, float(d))
         shown = _shown(joint, views, part, pixels_px, float(d))
-        change, covariance = _change_of_pixels(joint, shown)
-        out.append(_sigma(change[:, part.corner_count // 2], covariance))
+        out.append(_change_of_pixels(joint, shown)[:, part.corner_count // 2])
     return np.array(out)
 
 
+def focal_length_sigma_px(joint: Estimate, views: Views, distance_m: FloatArray) -> FloatArray:
+    """(D,) one sigma of alpha with the lens focused at each distance, pixels."""
+    return _sigma(focal_length_change_px(joint, views, distance_m), joint.covariance)
+
+
+def focal_length_change_px(joint: Estimate, views: Views, distance_m: FloatArray) -> FloatArray:
+    """(D, p) of alpha at (D,) distances, by each of the p numbers."""
+    at = COLUMN["alpha_px"]
+
+    def alpha(model: CellModel) -> FloatArray:
+        return np.array([optics_at(model, views, float(d))[at] for d in distance_m])
+
+    return _change(joint, alpha, np.ones(len(joint.unknowns), dtype=bool))
+
+
 def workpiece_sigma_m(
-    joint: JointFit, views: Views, pixels_px: FloatArray, distance_m: FloatArray
+    joint: Estimate, views: Views, pixels_px: FloatArray, distance_m: FloatArray
 ) -> FloatArray:
     """How far off the robot may be told a part is that one perfect picture locates.
 
@@ -122,13 +169,13 @@ def workpiece_sigma_m(
     for d in distance_m:
         part, _ = _part(joint, views, float(d))
         shown = _shown(joint, views, part, pixels_px, float(d))
-        change, covariance = _change_of_pixels(joint, shown)
-        located = _change_of_place(joint, shown) @ change.reshape(len(shown), -1, len(covariance))
-        out.append(_sigma(located, covariance))
+        change = _change_of_pixels(joint, shown)
+        located = _change_of_place(joint, shown) @ change.reshape(len(shown), -1, change.shape[-1])
+        out.append(_sigma(located, joint.covariance))
     return np.array(out)
 
 
-def _part(joint: JointFit, views: Views, distance_m: float) -> tuple[Board, float]:
+def _part(joint: Estimate, views: Views, distance_m: float) -> tuple[Board, float]:
     """Nine points on a square part, and its side."""
     alpha = float(optics_at(joint.model, views, distance_m)[0])
     extent = float(np.ptp(views.board.corners_m[:, :2], axis=0).mean())
@@ -144,7 +191,7 @@ def optics_at(model: CellModel, views: Views, distance_m: float) -> FloatArray:
 
 
 def _shown(
-    joint: JointFit, views: Views, part: Board, pixels_px: FloatArray, distance_m: float
+    joint: Estimate, views: Views, part: Board, pixels_px: FloatArray, distance_m: float
 ) -> Views:
     """Views of the part, one with its middle at each pixel."""
     optics, eye = optics_at(joint.model, views, distance_m)[None], np.eye(4)[None]
@@ -157,26 +204,26 @@ def _shown(
     return views_that_see(joint.model, views, part, poses, distance_m)
 
 
-def _change_of_pixels(joint: JointFit, shown: Views) -> tuple[FloatArray, FloatArray]:
-    """(F, M, 2, q) by the camera's q numbers, the part staying where it is; their covariance."""
-    at = _camera_numbers(joint, shown)
-    covariance = joint.covariance[np.ix_(at, at)]
-    columns = []
-    for k, sigma in zip(at, np.sqrt(np.diag(covariance)), strict=True):
-        step = np.zeros(len(joint.unknowns))
-        step[k] = _STEP_SIGMA * sigma
-        ahead, behind = (moved(joint.model, joint.unknowns, s) for s in (step, -step))
-        columns.append((predict(ahead, shown) - predict(behind, shown)) / (2 * step[k]))
-    return np.stack(columns, axis=-1), covariance
-
-
-def _camera_numbers(joint: JointFit, shown: Views) -> NDArray[np.int64]:
-    """Which of the fit's numbers are the camera's: all but where the board is."""
+def _change_of_pixels(joint: Estimate, shown: Views) -> FloatArray:
+    """(F, M, 2, p) by the camera's numbers, the part staying where it is; none by the board's."""
     board = "base_from_fixed" if shown.mount == "eye_in_hand" else "flange_from_mounted"
-    return np.flatnonzero([not u.name.startswith(f"{board}.") for u in joint.unknowns])
+    camera = np.array([not u.name.startswith(f"{board}.") for u in joint.unknowns])
+    return _change(joint, lambda model: predict(model, shown), camera)
 
 
-def _change_of_place(joint: JointFit, shown: Views) -> FloatArray:
+def _change(joint: Estimate, told: Callable[[CellModel], FloatArray], by: BoolArray) -> FloatArray:
+    """(..., p) of what a cell tells, by those of the p numbers; central differences."""
+    sigma = np.sqrt(np.diag(joint.covariance))
+    change = np.zeros((*told(joint.model).shape, len(sigma)))
+    for k in np.flatnonzero(by):
+        step = np.zeros(len(sigma))
+        step[k] = _STEP_SIGMA * sigma[k]
+        ahead, behind = (told(moved(joint.model, joint.unknowns, s)) for s in (step, -step))
+        change[..., k] = (ahead - behind) / (2 * step[k])
+    return change
+
+
+def _change_of_place(joint: Estimate, shown: Views) -> FloatArray:
     """(F, 3, 2M) of the part's middle, camera's axes, when the predicted pixels change."""
     state = walk(joint.model, shown)
     _, by_pose, _ = project_with_jacobians(state.optics, state.camera_from_board, state.points_m)

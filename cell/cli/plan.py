@@ -11,8 +11,8 @@ import typer
 from cell.cli.output import JsonFlag, show
 
 if TYPE_CHECKING:
-    from cell.files.plan_file import PlanFile
-    from cell.planning import PlanSize
+    from cell.files.plan_file import Plan
+    from cell.planning import Wish
 
 
 def plan(
@@ -20,9 +20,20 @@ def plan(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The plan file to write.")
     ] = None,
-    parallel: Annotated[int, typer.Option(min=0, help="Fronto-parallel views.")] = 16,
-    varied: Annotated[int, typer.Option(min=0, help="Tilted views.")] = 24,
-    seed: Annotated[int, typer.Option(min=0, help="Of the spread of the tilted views.")] = 1,
+    frames: Annotated[
+        int | None, typer.Option(min=1, help="Views in all, a quarter of them parallel; 40.")
+    ] = None,
+    parallel: Annotated[
+        int | None, typer.Option(min=0, help="Fronto-parallel views among them.")
+    ] = None,
+    varied: Annotated[int | None, typer.Option(min=0, help="Tilted views among them.")] = None,
+    alpha_sigma_px: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-6, help="Take the fewest views that promise alpha so well at every distance."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the spread of the candidates.")] = 1,
     by_hand: Annotated[
         bool, typer.Option("--by-hand", help="Near views tilted, far ones flat: the paper's plan.")
     ] = False,
@@ -36,54 +47,67 @@ def plan(
     ] = False,
     as_json: JsonFlag = False,
 ) -> None:
-    """Design a plan whose poses the arm can reach, with the board whole in the picture."""
-    from cell.planning import PlanSize
+    """Design a plan: the views that make the calibration most certain, and the way between them."""
+    from cell.planning import Wish
 
-    size = PlanSize(parallel, varied, seed, by_hand)
+    wish = Wish(frames, parallel, varied, alpha_sigma_px, seed, by_hand)
     if power:
-        _power(cell, output, size, as_json=as_json)
+        _power(cell, output, wish, as_json=as_json)
         return
     path = output or cell.with_name(cell.name.split(".")[0] + ".plan.yaml")
-    designed = _designed(cell, path, size)
-    stations = [view.station for view in designed.views]
-    counts = {kind: stations.count(kind) for kind in ("parallel", "varied")}
-    result = {"plan": str(path), "views": len(stations), **counts}
-    show(
-        f"{path}: {counts['parallel']} parallel and {counts['varied']} tilted views",
-        result,
-        as_json=as_json,
-    )
+    _tell(_written(cell, path, wish), as_json=as_json)
 
 
-def _designed(cell: Path, path: Path, size: PlanSize) -> PlanFile:
-    """Design a plan and write it."""
+def _designed(cell: Path, path: Path, wish: Wish) -> Plan:
     from cell.files.cell_file import read_cell
-    from cell.files.writing import check_new, write_new, yaml_text
+    from cell.files.plan_file import Plan
     from cell.planning import design_plan
+
+    beside = os.path.relpath(cell.resolve(), path.resolve().parent)
+    read = read_cell(cell)
+    return Plan(path, design_plan(read, wish.size_for(read), beside), read)
+
+
+def _written(cell: Path, path: Path, wish: Wish) -> Plan:
+    """Design a plan and write it."""
+    from cell.files.writing import check_new, write_new, yaml_text
 
     check_new(path)
-    beside = os.path.relpath(cell.resolve(), path.resolve().parent)
-    designed = design_plan(read_cell(cell), size, beside)
-    told = f"--parallel {size.parallel} --varied {size.varied} --seed {size.seed}"
-    told += " --by-hand" if size.by_hand else ""
-    comment = f"Made by `cell plan {cell.name} {told}`."
-    write_new(path, yaml_text(designed.as_mapping(), comment=comment))
-    return designed
+    plan = _designed(cell, path, wish)
+    comment = f"Made by `cell plan {' '.join([cell.name, *wish.as_words()])}`."
+    write_new(path, yaml_text(plan.file.as_mapping(), comment=comment))
+    return plan
 
 
-def _power(given: Path, output: Path | None, size: PlanSize, *, as_json: bool) -> None:
+def _tell(plan: Plan, *, as_json: bool) -> None:
+    from cell.planning import power, prospect
+
+    stations = [view.station for view in plan.file.views]
+    counts = {kind: stations.count(kind) for kind in ("parallel", "varied")}
+    promised, seen = prospect.prospect_of(plan), power.power_of(plan)
+    result = {
+        "plan": str(plan.path),
+        "views": len(stations),
+        **counts,
+        "expected": prospect.as_mapping(promised),
+        "effects": power.as_shares(seen),
+    }
+    head = f"{plan.path}: {counts['parallel']} parallel and {counts['varied']} tilted views"
+    lines = [head, *prospect.as_lines(promised), *power.as_lines(seen)]
+    show("\n".join(lines), result, as_json=as_json)
+
+
+def _power(given: Path, output: Path | None, wish: Wish, *, as_json: bool) -> None:
     from rich.console import Console
 
-    from cell.files.cell_file import read_cell
-    from cell.planning import design_plan
-    from cell.planning.power import as_mapping, as_text, is_plan, power_of_design, power_of_file
+    from cell.planning.power import as_mapping, as_text, is_plan, power_of, power_of_file
 
     if is_plan(given):
         found = power_of_file(given)
+    elif output is None:
+        found = power_of(_designed(given, given, wish))
     else:
-        cell = read_cell(given)
-        designed = design_plan(cell, size) if output is None else _designed(given, output, size)
-        found = power_of_design(designed, cell, output or given)
+        found = power_of(_written(given, output, wish))
     if as_json:
         show("", as_mapping(found), as_json=True)
     else:

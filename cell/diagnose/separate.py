@@ -23,7 +23,8 @@ from cell.files.plan_file import SCHEMA as PLAN_SCHEMA
 from cell.files.plan_file import PlanFile
 from cell.files.writing import yaml_text
 from cell.planning.candidates import Sight, parallel, varied
-from cell.planning.planner import Candidate, free, reachable, view_of
+from cell.planning.planner import view_of
+from cell.planning.reach import Candidate, free, layout_of, reachable
 from cell.recording import Recording
 from cell.sequencer.guard import Guard
 
@@ -110,39 +111,26 @@ def _walls(model: CellModel, views: Views, kinematics: ArmKinematics) -> dict[st
     }
 
 
-@dataclass(frozen=True)
-class _Stop:
-    """A view that the arm can take, with the joints at which it does."""
-
-    view: Candidate
-    joints_rad: FloatArray
-
-
-def _stops(found: Diagnosis, cell: CellFile, guard: Guard) -> list[_Stop]:
+def _stops(found: Diagnosis, cell: CellFile, guard: Guard) -> list[Candidate]:
     """Views of the whole board to which a free move leads from the middle of the recorded ones."""
-    layout = cell.layout
-    assert layout is not None
-    sight, home = Sight.of(cell), np.radians(layout.home_deg)
-    sights = [
-        ("parallel", view)
-        for distance in np.linspace(*layout.distances_m, _DISTANCES)
+    sight, distances = Sight.of(cell), layout_of(cell).distances_m
+    square = [
+        view
+        for distance in np.linspace(*distances, _DISTANCES)
         for view in parallel(sight, distance)
     ]
-    tilted = islice(varied(sight, layout.distances_m, seed=1), _VARIED)
-    sights += [("varied", view) for view in tilted]
+    tilted = islice(varied(sight, distances, seed=1), _VARIED)
+    stops = [
+        *reachable("parallel", square, cell, guard),
+        *reachable("varied", tilted, cell, guard),
+    ]
     lowest = found.views.base_from_flange[:, 2, 3].min()
-    stops = []
-    for station, view in sights:
-        for candidate in reachable(station, [view], cell, layout, guard):
-            joints = guard.kinematics.inverse(candidate.base_from_flange, home)
-            if candidate.base_from_flange[2, 3] >= lowest and free(guard, home, joints):
-                stops.append(_Stop(candidate, joints))
-    return stops
+    return [stop for stop in stops if stop.base_from_flange[2, 3] >= lowest]
 
 
-def _in_order(stops: list[_Stop], home: _Stop, guard: Guard) -> list[_Stop]:
+def _in_order(stops: list[Candidate], home: Candidate, guard: Guard) -> list[Candidate]:
     """Always on to the nearest that a free move leads to; over the home view where none does."""
-    left, here, way = list(stops), home, list[_Stop]()
+    left, here, way = list(stops), home, list[Candidate]()
     while left:
         left.sort(key=lambda stop: float(np.abs(stop.joints_rad - here.joints_rad).max()))
         near = [s for s in left if free(guard, here.joints_rad, s.joints_rad)]
@@ -196,7 +184,7 @@ class _Around:
         return replace(
             last,
             frame=int(views.frame.max()) + 1 + np.arange(n),
-            base_from_flange=np.array([stop.view.base_from_flange for stop in self.stops]),
+            base_from_flange=np.array([stop.base_from_flange for stop in self.stops]),
             joints_rad=joints,
             approach_joints_rad=np.repeat(self.home_rad[None], n, axis=0),
             joint_velocity_rad_s=np.zeros_like(joints),
@@ -205,13 +193,13 @@ class _Around:
 
     def _plan(self, name: str, design: Design, rounds: int, comment: str) -> str:
         pose = self.guard.kinematics.forward(self.home_rad)
-        home = _Stop(Candidate("varied", self._home_distance_m(), pose), self.home_rad)
+        home = Candidate("varied", self._home_distance_m(), pose, self.home_rad)
         way = _in_order([self.stops[k] for k in design.picked], home, self.guard) * rounds
         plan: dict[str, Any] = {
             "schema": PLAN_SCHEMA,
             "name": name,
             "cell": self.cell,
-            "views": [view_of(k, stop.view, stop.joints_rad) for k, stop in enumerate(way)],
+            "views": [view_of(k, stop) for k, stop in enumerate(way)],
         }
         if self.cell.camera.focus == "auto":
             plan["exposure"] = {"focus": "auto"}

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.stats import qmc
 
-from calib.views import Board, FloatArray
+from calib.views import Board, BoolArray, FloatArray
 from cell.errors import InputError
 from cell.files.cell_file import CellFile
 
 _EDGE = 0.03
 """Share of the image kept free along every edge: the layout is known to a centimetre or two."""
-_ROLLS_RAD = np.radians([0.0, 180.0, 90.0, -90.0])
+QUARTER_TURNS_RAD = np.radians([0.0, 180.0, 90.0, -90.0])
+TWELFTHS_RAD = np.radians(30.0 * np.arange(12))
 TILT_RAD = (np.radians(12.0), np.radians(42.0))
+_SHARES = np.linspace(0.9, 0.0, 10)
+"""Of the way from the image's middle to its edge, for the board's centre."""
+
 BY_HAND_TILT_RAD = (np.radians(15.0), np.radians(3.0))
 """Tilt of the nearest and of the farthest view when a board is photographed by hand."""
 
@@ -50,36 +55,38 @@ class Sight:
             )
         return cls(cell.board.board(), camera.width, camera.height, alpha_px)
 
-    def whole(self, camera_from_board: RigidTransform) -> bool:
-        """Whether every corner, and half a square around, lie inside the image."""
+    @cached_property
+    def _outline_m(self) -> FloatArray:
+        """(4, 3) corners of the board and half a square around, from the board's centre."""
         corners = self.board.corners_m
         border = 0.5 * self.board.square_m
         low, high = corners.min(axis=0) - border, corners.max(axis=0) + border
-        outline = np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
-        x, y, z = camera_from_board.apply(outline).T
-        if (z <= 0).any():
-            return False
+        outline = [[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])]
+        return np.asarray(np.array(outline) - corners.mean(axis=0))
+
+    def whole(self, turn: Rotation, centre_m: FloatArray) -> BoolArray:
+        """(...) whether board and half a square around are in the image, its centre at (..., 3)."""
+        x, y, z = np.moveaxis(turn.apply(self._outline_m) + centre_m[..., None, :], -1, 0)
         half = 0.5 - _EDGE
-        across = np.abs(self.alpha_px * x / z) <= half * self.width_px
-        down = np.abs(self.alpha_px * y / z) <= half * self.height_px
-        return bool((across & down).all())
+        across = np.abs(self.alpha_px * x) <= half * self.width_px * z
+        down = np.abs(self.alpha_px * y) <= half * self.height_px * z
+        return np.asarray((across & down & (z > 0)).all(axis=-1))
 
-    def placed(
-        self, turn: Rotation, distance_m: float, aim: FloatArray | None = None
-    ) -> RigidTransform:
-        """camera_from_board with the board's centre `distance_m` deep, seen at `aim` (x/z, y/z)."""
-        x, y = (0.0, 0.0) if aim is None else aim
-        centre_in_board = self.board.corners_m.mean(axis=0)
-        centre_in_camera = distance_m * np.array([x, y, 1.0])
-        return RigidTransform.from_components(centre_in_camera - turn.apply(centre_in_board), turn)
+    def placed(self, turn: Rotation, centre_m: FloatArray) -> RigidTransform:
+        """camera_from_board with the board's centre there."""
+        shift = centre_m - turn.apply(self.board.corners_m.mean(axis=0))
+        return RigidTransform.from_components(shift, turn)
 
 
-def parallel(sight: Sight, distance_m: float) -> Iterator[RigidTransform]:
+def parallel(
+    sight: Sight, distance_m: float, rolls_rad: FloatArray = QUARTER_TURNS_RAD
+) -> Iterator[RigidTransform]:
     """Fronto-parallel views (camera_from_board) at one distance, by preference of the roll."""
-    for roll in _ROLLS_RAD:
-        view = sight.placed(Rotation.from_rotvec([0.0, 0.0, roll]), distance_m)
-        if sight.whole(view):
-            yield view
+    ahead = np.array([0.0, 0.0, distance_m])
+    for roll in rolls_rad:
+        turn = Rotation.from_rotvec([0.0, 0.0, roll])
+        if sight.whole(turn, ahead):
+            yield sight.placed(turn, ahead)
 
 
 def varied(
@@ -113,8 +120,6 @@ def _pushed_aside(
     """The board as far towards the image's edge as it goes while it is whole."""
     half = 0.5 * np.array([sight.width_px, sight.height_px]) / sight.alpha_px
     towards = half * np.array([np.cos(direction_rad), np.sin(direction_rad)])
-    for share in np.linspace(0.9, 0.0, 10):
-        view = sight.placed(turn, distance_m, share * towards)
-        if sight.whole(view):
-            return view
-    return None
+    centres = distance_m * np.column_stack([_SHARES[:, None] * towards, np.ones(len(_SHARES))])
+    whole = np.flatnonzero(sight.whole(turn, centres))
+    return sight.placed(turn, centres[whole[0]]) if len(whole) else None

@@ -5,23 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
+import numpy as np
 from rich.console import Group
 from rich.table import Table
 
 from calib.discovery.design.power import EffectPower, Power, alike, plan_power
-from calib.solver.noise import Noise
-from cell.errors import InputError
-from cell.files.cell_file import CellFile, Simulation
 from cell.files.plan_file import SCHEMA as PLAN_SCHEMA
-from cell.files.plan_file import Plan, PlanFile, read_plan
+from cell.files.plan_file import Plan, read_plan
 from cell.files.yaml_model import read_mapping
-from cell.planning.candidates import Sight
+from cell.planning.nominal import assumed_noise, nominal
 from cell.simulated import home_of, log_of, simulated_cell
 
-USUAL_NOISE = Noise(corner_px=0.1, flange_m=3e-5, flange_rad=1e-4)
-"""A good detector and an arm of this class; taken where the cell file does not tell."""
+_WIDTH = 100
 
 
 @dataclass(frozen=True)
@@ -42,11 +40,6 @@ def power_of_file(path: Path) -> PlanPower:
     return power_of(read_plan(path))
 
 
-def power_of_design(designed: PlanFile, cell: CellFile, path: Path) -> PlanPower:
-    """Power of a plan that has just been designed for a cell."""
-    return power_of(Plan(path, designed, cell))
-
-
 def power_of(plan: Plan) -> PlanPower:
     """Say what a plan would reveal of the plain cell.
 
@@ -55,41 +48,12 @@ def power_of(plan: Plan) -> PlanPower:
     InputError
         The cell tells neither `simulation` nor `layout`, or a view cannot be reached.
     """
-    cell = _nominal(plan.cell)
+    cell = nominal(plan.cell)
     plan = Plan(plan.path, plan.file, cell)
     simulated = simulated_cell(cell, home_of(plan))
-    noise, noise_from = _noise(plan.cell)
+    noise, noise_from = assumed_noise(plan.cell)
     log = log_of(plan, simulated)
     return PlanPower(plan_power(simulated.model.with_effects(()), log, noise), noise_from)
-
-
-def _nominal(cell: CellFile) -> CellFile:
-    """The cell with a `simulation` section: its own, or what its layout says."""
-    if cell.simulation is not None:
-        return cell
-    if cell.layout is None:
-        raise InputError(
-            f"cell {cell.name}: says neither `layout` nor `simulation`, so nobody knows what the"
-            " camera sees; measure the layout with a tape"
-        )
-    alpha = Sight.of(cell).alpha_px
-    u0, v0 = 0.5 * (cell.camera.width - 1), 0.5 * (cell.camera.height - 1)
-    optics = {"alpha_px": alpha, "beta_px": alpha, "u0_px": u0, "v0_px": v0}
-    truth = Simulation(mounted=cell.layout.mounted, fixed=cell.layout.fixed, optics=optics)
-    return cell.model_copy(update={"simulation": truth})
-
-
-def _noise(cell: CellFile) -> tuple[Noise, str]:
-    told = cell.simulation.noise if cell.simulation else None
-    if told is None:
-        return USUAL_NOISE, "assumed; the cell file does not tell"
-    noise = Noise(
-        corner_px=told.corner_px or USUAL_NOISE.corner_px,
-        flange_m=told.arm_position_m or USUAL_NOISE.flange_m,
-        flange_rad=told.arm_rotation_rad or USUAL_NOISE.flange_rad,
-    )
-    levels = (told.corner_px, told.arm_position_m, told.arm_rotation_rad)
-    return noise, "simulation.noise" if all(levels) else "simulation.noise, zeros as usual"
 
 
 def as_mapping(found: PlanPower) -> dict[str, Any]:
@@ -131,6 +95,31 @@ def _effect(power: EffectPower) -> Mapping[str, Any]:
             for limit in power.limits
         },
     }
+
+
+def as_shares(found: PlanPower) -> dict[str, float | None]:
+    """For each effect the size found 9 times in 10 as a share of its usual one; None: never."""
+    return {
+        e.effect.label: float(np.sqrt(e.needed / e.strength)) if e.strength > 0 else None
+        for e in found.power.effects
+    }
+
+
+def as_lines(found: PlanPower) -> list[str]:
+    """The short of it, for people."""
+    power, shares = found.power, as_shares(found)
+    told = ", ".join("{} {}".format(k, "-" if v is None else f"{v:.2g}") for k, v in shares.items())
+    missed = [e.effect.label for e in power.effects if not e.detected]
+    pairs = [f"{first.effect.label} and {rival.label}" for first, rival in alike(power)]
+    words = f"effects it would reveal, at this share of their usual size: {told}"
+    lines = fill(words, _WIDTH, subsequent_indent="  ").splitlines()
+    if missed:
+        lines.append(f"missed at their usual size: {', '.join(missed)}")
+    lines += [f"cannot be seen: {name} ({why})" for name, why in power.unseen.items()]
+    if pairs:
+        words = f"could not be told apart: {'; '.join(pairs)}"
+        lines += fill(words, _WIDTH, subsequent_indent="  ").splitlines()
+    return [*lines, "sizes with their units: `cell plan --power` with the plan's name"]
 
 
 def as_text(found: PlanPower) -> Group:

@@ -151,13 +151,13 @@ def test_sigma_of_the_scale_factor_holds_what_it_promises(tmp_path: Path) -> Non
 def test_few_frames_do_not_pass_a_moving_lens_for_a_still_one(tmp_path: Path) -> None:
     plan = read_plan(strided_plan(tmp_path))
     views = corners_of_plan(plan, seed=3)
-    far = views.take(np.argsort(-_depth_m(plan))[:12])
+    far = views.take(np.argsort(-_depth_m(plan))[:7])
     near_m = np.array([0.34])
     still = fit_so_far(far, lens_moves=False)
     moving = fit_so_far(far, lens_moves=True)
     if still.joint.model.effects:
         pytest.fail("the far views alone demand a law now; choose others")
-    assert moving.alpha_over(near_m)[1][0] > 3 * still.alpha_over(near_m)[1][0]
+    assert moving.alpha_over(near_m)[1][0] > 2 * still.alpha_over(near_m)[1][0]
 
 
 def _depth_m(plan: Plan) -> np.ndarray:

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise, permutations
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +12,16 @@ from ruamel.yaml import YAML
 from calib.chain import rigid
 from calib.chain.optics import optics_row
 from calib.chain.projection import project
+from calib.views import FloatArray
 from cell.errors import InputError
 from cell.files.cell_file import CellFile, read_cell
 from cell.files.plan_file import Plan, PlanFile, read_plan
 from cell.files.writing import yaml_text
-from cell.planning import PlanSize, design_plan
+from cell.planning import PlanSize, Wish, design_plan
+from cell.planning.pool import Pool
+from cell.planning.prospect import prospect_of
+from cell.planning.tour import nearest_next, shortened, shortest_tour
+from cell.planning.wish import fewest
 from cell.sequencer.guard import Guard
 from sim import presets
 from tests.cell.plans import CELL
@@ -46,7 +54,7 @@ def test_every_planned_view_is_allowed_and_shows_the_whole_board(name: str) -> N
     parallel = np.array([view.station == "parallel" for view in plan.file.views])
     tilt = np.degrees(np.arccos(camera_from_board[:, 2, 2]))
     assert tilt[parallel].max() < 0.01
-    assert 11.9 < tilt[~parallel].min() < 20
+    assert tilt[~parallel].min() > 11.9
     assert 35 < tilt[~parallel].max() < 42.1
     distance = camera_from_board[parallel] @ [*board.corners_m.mean(axis=0), 1.0]
     low, high = plan.cell.layout.distances_m
@@ -55,12 +63,144 @@ def test_every_planned_view_is_allowed_and_shows_the_whole_board(name: str) -> N
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_plans_that_come_along_are_what_the_planner_makes(name: str) -> None:
-    path = CONFIGS / f"{name}.plan.yaml"
-    made = design_plan(read_cell(CONFIGS / f"{name}.cell.yaml"), cell_path=f"{name}.cell.yaml")
-    for planned, stored in zip(made.views, read_plan(path).file.views, strict=True):
-        assert planned.name == stored.name
-        np.testing.assert_allclose(planned.joints_deg, stored.joints_deg, atol=1e-3)
+def test_the_plans_that_come_along_are_as_good_as_what_the_planner_makes(name: str) -> None:
+    stored = read_plan(CONFIGS / f"{name}.plan.yaml")
+    made = design_plan(stored.cell, cell_path=f"{name}.cell.yaml")
+    kinds = [[view.station for view in plan.views] for plan in (made, stored.file)]
+    assert [kind.count("parallel") for kind in kinds] == [kinds[0].count("parallel")] * 2
+    assert [len(kind) for kind in kinds] == [40, 40]
+    # another processor may round one choice among near equals differently
+    told, kept = (prospect_of(Plan(stored.path, plan, stored.cell)) for plan in (made, stored.file))
+    np.testing.assert_allclose(told.alpha_sigma_px, kept.alpha_sigma_px, rtol=0.05)
+    np.testing.assert_allclose(told.projection_sigma_px, kept.projection_sigma_px, rtol=0.05)
+    assert told.duration.whole_s == pytest.approx(kept.duration.whole_s, rel=0.2)
+
+
+@cache
+def pool(name: str) -> Pool:
+    return Pool(read_cell(CONFIGS / f"{name}.cell.yaml"), seed=1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_chosen_views_are_worth_more_than_twice_as_many_evenly_spread_ones(name: str) -> None:
+    candidates = pool(name)
+    chosen = candidates.choose(PlanSize())
+    assert [c.station for c in chosen].count("parallel") >= 9
+    assert len(set(chosen)) == 40
+    assert candidates.alpha_sigma_px(chosen) < candidates.alpha_sigma_px(candidates.varied[:80])
+    without = candidates.choose(PlanSize(), chosen[-5:])
+    assert len(without) == 40
+    assert not set(without) & set(chosen[-5:])
+
+
+def test_the_fewest_views_for_a_goal_meet_it_and_one_less_does_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    candidates = pool("ur3-robotiq")
+    size = fewest(candidates, 0.16, seed=1)
+    assert 10 < size.frames < 40
+    assert candidates.alpha_sigma_px(candidates.choose(size)) <= 0.16
+    less = PlanSize.of(size.frames - 1)
+    assert candidates.alpha_sigma_px(candidates.choose(less)) > 0.16
+    monkeypatch.setattr("cell.planning.wish.MOST_FRAMES", 16)
+    with pytest.raises(InputError, match="16 views promise alpha to"):
+        fewest(candidates, 0.001, seed=1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_arm_does_not_flip_between_neighbours_and_its_way_is_short(name: str) -> None:
+    plan = read_plan(CONFIGS / f"{name}.plan.yaml")
+    assert plan.cell.layout is not None
+    degrees = [plan.cell.layout.home_deg, *(v.joints_deg for v in plan.file.views)]
+    joints = np.radians(degrees)
+    assert np.abs(np.diff(degrees, axis=0))[:, :5].max() <= 120.0
+    guard = Guard.of(plan)
+    taken = sum(guard.move_time_s(a, b) for a, b in pairwise(joints))
+    rng = np.random.default_rng(0)
+    shuffled = [[joints[0], *joints[1 + rng.permutation(40)]] for _ in range(5)]
+    others = [sum(guard.move_time_s(a, b) for a, b in pairwise(way)) for way in shuffled]
+    assert taken < 0.6 * min(others)
+
+
+def test_a_tour_is_as_short_as_the_best_of_all_orders_nearly_always() -> None:
+    rng = np.random.default_rng(0)
+    best_found = 0
+    for _ in range(12):
+        at = rng.random((7, 2))
+        seconds = np.linalg.norm(at[:, None] - at, axis=-1)
+        way = shortened(nearest_next(seconds), seconds)
+        assert (way[0], sorted(way)) == (0, list(range(7)))
+        lengths = [_length([0, *rest], seconds) for rest in permutations(range(1, 7))]
+        assert _length(way, seconds) < 1.15 * min(lengths)
+        best_found += _length(way, seconds) < min(lengths) + 1e-9
+    assert best_found >= 9
+
+
+def _length(way: list[int], seconds: FloatArray) -> float:
+    return float(seconds[way[:-1], way[1:]].sum())
+
+
+def test_a_view_that_no_move_leads_to_is_left_out() -> None:
+    candidates = pool("ur3-robotiq")
+    views = list(candidates.varied[:6])
+    far = candidates.home_rad + np.radians([0.0, 0, 0, 0, 150, 0])
+    flipped = replace(views[2], joints_rad=far)
+    tour, left_out = shortest_tour(
+        [*views[:2], flipped, *views[3:]], candidates.home_rad, candidates.guard
+    )
+    assert left_out == [flipped]
+    assert set(tour) == {*views[:2], *views[3:]}
+
+
+def test_views_keep_out_of_the_boxes_and_the_plan_says_what_it_promises() -> None:
+    cell = bench()
+    assert cell.layout is not None
+    before_it = cell.layout.fixed.model_copy(update={"p_m": (-0.5, -0.13, 0.0)})
+    layout = cell.layout.model_copy(update={"alpha_px": 700.0, "fixed": before_it})
+    cell = cell.model_copy(update={"layout": layout})
+    plan = Plan(Path("made.plan.yaml"), design_plan(cell, PlanSize(3, 9)), cell)
+    guard = Guard.of(plan)
+    assert len(guard.check_plan(plan, np.radians(cell.layout.home_deg))) == 12
+    told = prospect_of(plan)
+    assert told.noise_from.startswith("assumed")
+    assert (np.diff(told.distance_m) > 0).all()
+    for sigma in (told.alpha_sigma_px, told.projection_sigma_px, told.workpiece_sigma_m):
+        assert sigma.shape == (4,)
+        assert (sigma > 0).all()
+    time = told.duration
+    assert time.whole_s == pytest.approx(
+        time.motion_s + time.settle_s + time.focus_s + time.exposure_s
+    )
+    assert time.settle_s == pytest.approx(12 * 0.25)
+    assert time.focus_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("wish", "message"),
+    [
+        (Wish(40, 10, 30), "give two of --frames, --parallel and --varied"),
+        (Wish(10, 12), "--frames is less than"),
+        (Wish(frames=20, alpha_sigma_px=0.1), "says how many views by itself"),
+    ],
+)
+def test_wishes_that_contradict_each_other_are_said(wish: Wish, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        wish.size_for(bench())
+
+
+def test_wishes_make_sizes() -> None:
+    sizes = {
+        Wish(): (10, 30),
+        Wish(frames=20): (5, 15),
+        Wish(frames=20, parallel=8): (8, 12),
+        Wish(frames=20, varied=14): (6, 14),
+        Wish(parallel=4): (4, 30),
+        Wish(parallel=4, varied=6): (4, 6),
+    }
+    for wish, (parallel, varied) in sizes.items():
+        assert wish.size_for(bench()) == PlanSize(parallel, varied)
+    with pytest.raises(InputError, match="4 views do not make a calibration"):
+        design_plan(bench(), PlanSize(2, 2))
 
 
 @pytest.mark.parametrize(
@@ -104,7 +244,7 @@ def test_a_board_out_of_reach_is_said() -> None:
     far = cell.layout.fixed.model_copy(update={"p_m": (3.0, 0.0, 0.0)})
     layout = cell.layout.model_copy(update={"fixed": far, "alpha_px": 500.0})
     with pytest.raises(InputError, match="the arm can take only 0 views"):
-        design_plan(cell.model_copy(update={"layout": layout}), PlanSize(2, 2))
+        design_plan(cell.model_copy(update={"layout": layout}))
 
 
 def test_a_plan_survives_writing_and_reading(tmp_path: Path) -> None:
@@ -122,7 +262,7 @@ def test_the_plan_by_hand_tilts_the_near_views_and_leaves_the_far_ones_flat() ->
     path = CONFIGS / "irb140-eosens-by-hand.plan.yaml"
     made = design_plan(
         read_cell(CONFIGS / "irb140-eosens.cell.yaml"),
-        PlanSize(by_hand=True),
+        PlanSize(16, 24, by_hand=True),
         "irb140-eosens.cell.yaml",
     )
     stored = read_plan(path)

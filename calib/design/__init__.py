@@ -1,0 +1,1 @@
+"""Which views make what a user needs least uncertain."""
