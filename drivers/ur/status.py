@@ -34,7 +34,7 @@ _SAFETY_BITS = {
     3: ("recovery mode", "move the arm back inside its limits by hand"),
     2: (
         "protective stop",
-        "find out what the arm ran into, clear it, wait five seconds, then recover the arm",
+        "find out what it ran into, clear it, wait five seconds, unlock it at the teach pendant",
     ),
 }
 
