@@ -130,7 +130,7 @@ class Found:
         ]
         return [
             *told,
-            f"layout.alpha_px: {self.alpha_px:.0f}, known to {self.alpha_sigma_px:.0f} px",
+            f"layout.alpha_px: {self.alpha_px:.1f}, known to {self.alpha_sigma_px:.1f} px",
             f"{self.frames} frames, rms {self.rms_px:.2f} px",
         ]
 
