@@ -43,11 +43,14 @@ def test_a_wrong_layout_is_found_without_leaving_the_neighbourhood(
     assert off_m < 5 * np.linalg.norm(trial.found.mounted_sigma_m)
     whole, views = trial.planned_views_whole()
     assert whole == views > 30
-    frames = read_recording(trial.task.recording).frames
+    folder = tmp_path / "trial"
+    frames = read_recording(folder / "run").frames
     assert frames[-1].view == "back where it started"
-    np.testing.assert_allclose(frames[-1].joints_rad, trial.start_rad, atol=1e-9)
-    assert read_plan(trial.task.plan_path).cell == read_cell(trial.task.found_path)
-    events = [event["event"] for event in read_journal(trial.task.recording)]
+    np.testing.assert_allclose(frames[-1].joints_rad, frames[0].joints_rad, atol=1e-9)
+    (found,) = folder.glob("*.found.yaml")
+    (planned,) = folder.glob("*.found.plan.yaml")
+    assert read_plan(planned).cell == read_cell(found)
+    events = [event["event"] for event in read_journal(folder / "run")]
     assert events.count("decided") == len(frames) - 1
 
 

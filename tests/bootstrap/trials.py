@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +13,26 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from calib.chain import rigid
 from calib.chain.kinematics import arm
 from calib.chain.model import CellModel, predict, walk
+from calib.detection import Detection
 from calib.views import BoolArray, FloatArray, Views
 from cell.bootstrap import Bootstrap, Told
 from cell.bootstrap.found import Found
-from cell.bootstrap.near_guard import FARTHEST_M, FARTHEST_RAD, TRAVEL_RAD
+from cell.bootstrap.guide import BootstrapGuide
+from cell.bootstrap.near_guard import FARTHEST_M, FARTHEST_RAD, TRAVEL_RAD, NearGuard
+from cell.errors import CellError
 from cell.files.cell_file import CellFile, EffectFile, Layout, read_cell
 from cell.files.parts import Pose
-from cell.files.plan_file import read_plan
+from cell.files.plan_file import PlanFile, read_plan
 from cell.files.writing import yaml_text
-from cell.recording import read_recording
+from cell.planning import design_plan
+from cell.recording import FrameRecord, read_recording
+from cell.sequencer.checks import Verdict
 from cell.sequencer.guard import Guard
-from cell.sequencer.states import RunResult
+from cell.sequencer.shot import Shot
+from cell.sequencer.watcher import Checked
 from cell.simulated import simulated_cell
+from drivers.arm import ArmState, Motion
+from drivers.camera import Frame
 from drivers.errors import SafetyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -134,16 +142,18 @@ class Trial:
     ----------
     cell:
         With the wrong layout; `simulation` is the truth.
-    task, result, found:
-        What was done and what it came to.
+    stops_rad:
+        (N, 6) where the arm stood, and where it was moved from there.
+    found, planned_rad:
+        What was found, and the (V, 6) joint angles of the plan.
     error:
-        Why nothing was found or written.
+        Why nothing was found or planned.
     """
 
     cell: CellFile
-    task: Bootstrap
-    result: RunResult | None
+    stops_rad: FloatArray
     found: Found | None
+    planned_rad: FloatArray | None
     error: str | None
 
     @property
@@ -160,20 +170,17 @@ class Trial:
 
     def planned_views_whole(self) -> tuple[int, int]:
         """How many of the plan's views show the whole board in truth, and how many there are."""
-        plan = read_plan(self.task.plan_path)
-        joints = np.array([view.joints() for view in plan.file.views])
-        return int(whole(self.cell, joints).sum()), len(joints)
+        assert self.planned_rad is not None
+        return int(whole(self.cell, self.planned_rad).sum()), len(self.planned_rad)
 
     def violations(self) -> list[str]:
         """What the moves did against the true boxes and the allowed neighbourhood."""
         found = []
-        guard, start = self._guard, self.start_rad
+        guard, start = self._guard, self.stops_rad[0]
         home = guard.kinematics.forward(start)
-        for frame in read_recording(self.task.recording).frames:
-            assert frame.approach_joints_rad is not None
-            here, there = np.array(frame.approach_joints_rad), np.array(frame.joints_rad)
+        for number, (here, there) in enumerate(pairwise(self.stops_rad), 1):
             try:
-                guard.check_move(here, there, f"frame {frame.frame}")
+                guard.check_move(here, there, f"move {number}")
             except SafetyError as refusal:
                 found.append(str(refusal))
             path = guard.path(here, there)
@@ -182,18 +189,13 @@ class Trial:
             turned = Rotation.from_matrix(away[:, :3, :3]).magnitude().max()
             far = (np.abs(path - start) > TRAVEL_RAD + 1e-3).any()
             if far or moved_m > FARTHEST_M + 1e-3 or turned > FARTHEST_RAD + 1e-3:
-                found.append(f"frame {frame.frame}: left the neighbourhood of the start")
+                found.append(f"move {number}: left the neighbourhood of the start")
         return found
-
-    @cached_property
-    def start_rad(self) -> FloatArray:
-        """(6,) where the arm stood."""
-        return np.array(read_recording(self.task.recording).frames[0].joints_rad)
 
     @property
     def _guard(self) -> Guard:
         """Knows the truth."""
-        truth, home_deg = self.cell.simulation, tuple(np.degrees(self.start_rad).tolist())
+        truth, home_deg = self.cell.simulation, tuple(np.degrees(self.stops_rad[0]).tolist())
         assert truth is not None
         layout = Layout(
             mounted=truth.mounted, fixed=truth.fixed, home_deg=home_deg, distances_m=(0.3, 1.0)
@@ -234,20 +236,79 @@ def start_in_view(cell: CellFile, rng: np.random.Generator) -> tuple[float, ...]
 
 
 def run_trial(cell: CellFile, folder: Path, start_deg: tuple[float, ...] | None = None) -> Trial:
-    """Bootstrap a cell in a dry run."""
+    """Bootstrap a cell in a dry run: pictures, the loop that moves the arm, files."""
     folder.mkdir(parents=True)
     path = folder / f"{cell.name}.cell.yaml"
     path.write_text(yaml_text(cell.as_mapping()))
     task = Bootstrap.of(path, folder / "run", folder, Told())
-    devices = task.devices(dry_run=True, start_deg=start_deg)
-    result, found, error = None, None, None
+    done = task.run(task.devices(dry_run=True, start_deg=start_deg), simulated=True)
+    frames = read_recording(task.recording).frames
+    stops = np.array([frame.joints_rad for frame in frames])
+    if done.found is None:
+        return Trial(cell, stops, None, None, done.result.reason)
+    task.write(done)
+    plan = read_plan(task.plan_path)
+    return Trial(cell, stops, done.found, _joints(plan.file), None)
+
+
+def run_on_corners(
+    cell: CellFile, rng: np.random.Generator, start_deg: tuple[float, ...] | None = None
+) -> Trial:
+    """Bootstrap a cell without pictures: the true cell's corners go straight to the guide."""
+    assert cell.layout is not None
+    start = np.radians(cell.layout.home_deg if start_deg is None else start_deg)
+    guard = NearGuard.around(cell, start, Told())
+    stops = [start]
     try:
-        done = task.run(devices, simulated=True)
-        result, found = done.result, done.found
-        if found is None:
-            error = result.reason
-        else:
-            task.write(done)
-    except Exception as refusal:
-        error = f"{type(refusal).__name__}: {refusal}"
-    return Trial(cell, task, result, found, error)
+        guard.check_start()
+        guide = BootstrapGuide(cell, cell.layout, guard, Told())
+        guide.checked(frame_of(cell, start, 0, rng))
+        while (view := guide.next_view()) is not None:
+            stops.append(np.array(view.joints()))
+            if whole(cell, stops[-1][None])[0]:
+                guide.checked(frame_of(cell, stops[-1], len(stops), rng))
+        assert guide.knowledge is not None
+        found = Found.of(guide.knowledge, guide.layout)
+    except (CellError, SafetyError) as refusal:
+        return Trial(cell, np.array(stops), None, None, str(refusal))
+    try:
+        found.check_good(guide.refusal)
+        plan = design_plan(found.in_cell(cell))
+    except CellError as refusal:
+        return Trial(cell, np.array(stops), found, None, str(refusal))
+    return Trial(cell, np.array(stops), found, _joints(plan), None)
+
+
+def frame_of(
+    cell: CellFile, joints_rad: FloatArray, index: int, rng: np.random.Generator
+) -> Checked:
+    """What a run's check would say of the true cell at these joints, its arm's scatter in it."""
+    board, camera, truth = cell.board.board(), cell.camera, cell.simulation
+    assert truth is not None
+    logged = arm(cell.robot.model or "").forward(joints_rad)
+    scatter = np.repeat([truth.noise.arm_position_m, truth.noise.arm_rotation_rad], 3)
+    error = scatter * rng.standard_normal((1, 6))
+    blank = Views.blank(
+        board, width_px=camera.width, height_px=camera.height, frames=1, mount=cell.mount
+    )
+    log = {"robot_model": cell.robot.model, "joints_rad": joints_rad[None]}
+    views = replace(blank, base_from_flange=logged[None], **log)
+    corners = predict(truth_of(cell), views, flange_error=error)[0]
+    corners = corners + truth.noise.corner_px * rng.standard_normal(corners.shape)
+    state = ArmState(
+        host_t_s=0.0,
+        controller_t_s=None,
+        joints_rad=tuple(joints_rad.tolist()),
+        joint_velocity_rad_s=None,
+        base_from_flange=RigidTransform.from_matrix(logged),
+        motion=Motion.STEADY,
+    )
+    shot = Shot(index, Frame(np.zeros((2, 2), np.uint8), 0.0), (state,), state.joints_rad or ())
+    each = np.ones(board.corner_count)
+    covariance = np.tile(np.eye(2), (board.corner_count, 1, 1))
+    detection = Detection(corners, covariance, each, each, each, True, 0.0)
+    return Checked(shot, Verdict(None, detection), FrameRecord(frame=index))
+
+
+def _joints(plan: PlanFile) -> FloatArray:
+    return np.array([view.joints() for view in plan.views])
