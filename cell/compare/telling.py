@@ -21,9 +21,17 @@ def verdict(difference: Difference) -> str:
         case None:
             return "whether they differ by more than chance is not known: no uncertainties"
         case True:
-            return f"they differ by more than chance (p = {difference.p_value:.1g})"
+            return f"they differ by more than chance (p {_chance(difference.p_value, 1)})"
         case _:
-            return f"they agree within their uncertainty (p = {difference.p_value:.2g})"
+            return f"they agree within their uncertainty (p {_chance(difference.p_value, 2)})"
+
+
+_LEAST_P = 1e-99
+
+
+def _chance(p_value: float | None, digits: int) -> str:
+    assert p_value is not None
+    return f"< {_LEAST_P:g}" if p_value < _LEAST_P else f"= {p_value:.{digits}g}"
 
 
 def parts(comparison: Comparison) -> dict[str, Difference]:
