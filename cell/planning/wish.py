@@ -97,8 +97,8 @@ def fewest(pool: Pool, alpha_sigma_px: float, seed: int) -> PlanSize:
     while (reached := sigma_px(high)) > alpha_sigma_px:
         if high == MOST_FRAMES:
             raise InputError(
-                f"{MOST_FRAMES} views promise alpha to {reached:.2g} px and no better; ask for"
-                " less, or for --frames, and take the plan several times"
+                f"{MOST_FRAMES} views promise alpha to {reached:.2g} px and no better: give a"
+                " larger --alpha-sigma-px, or --frames, and take that plan several times"
             )
         low, high = high, min(2 * high, MOST_FRAMES)
     while high - low > 1:
