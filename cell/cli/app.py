@@ -23,6 +23,7 @@ from cell.cli.run import run
 from cell.cli.simulate import simulate
 from cell.cli.study import study
 from cell.cli.verify import verify
+from cell.compiled import prepare
 from cell.errors import EXIT_OPERATOR, exit_status_of
 
 app = typer.Typer(
@@ -54,6 +55,7 @@ def main() -> None:
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s: %(message)s")
     # Debian's own matplotlib shadows the 3-D axes of ours, which nothing here draws
     warnings.filterwarnings("ignore", message="Unable to import Axes3D")
+    prepare(sys.argv[1:])
     try:
         app()
     except KeyboardInterrupt:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
-import calib
+from cell.compiled import places, writable
 from cell.doctor.finding import Finding
 from cell.files.camera_file import GigeCamera
 from cell.files.cell_file import CellFile
@@ -47,22 +45,15 @@ def installed(cell: CellFile | None) -> list[Finding]:
 
 
 def _compiled() -> Finding:
-    """Where numba keeps compiled code, in the order in which numba looks for a place."""
-    given = os.environ.get("NUMBA_CACHE_DIR")
-    places = [Path(given)] if given else [Path(calib.__file__).parent, Path.home() / ".cache"]
-    place = next((place for place in places if _writable(place)), None)
+    """A place for compiled code."""
+    known = places()
+    place = next((place for place in known if writable(place)), None)
     return Finding(
         "numba cache",
         place is not None,
-        f"{' and '.join(map(str, places))} cannot be written" if place is None else str(place),
-        "export NUMBA_CACHE_DIR=/path/you/may/write; without it nothing that is compiled can start",
+        f"{' and '.join(map(str, known))} cannot be written" if place is None else str(place),
+        "export NUMBA_CACHE_DIR=/path/you/may/write; without it all is compiled anew after a boot",
     )
-
-
-def _writable(place: Path) -> bool:
-    """Whether a folder can be written, or made."""
-    there = next(folder for folder in (place, *place.parents) if folder.exists())
-    return there.is_dir() and os.access(there, os.W_OK)
 
 
 def _package(name: str, mend: str, *, needed: bool = True) -> Finding:

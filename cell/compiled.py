@@ -1,0 +1,69 @@
+"""Where numba keeps compiled code, and a word before the wait while it is made.
+
+The first use on a machine compiles; later ones load what was kept beside the code or, where that
+folder is read-only, in the user's cache. Where neither can be written numba would refuse to start,
+so a folder for temporary files serves.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+VARIABLE = "NUMBA_CACHE_DIR"
+VERBS = ("run", "bootstrap", "plan", "simulate", "calibrate", "diagnose", "verify", "study")
+"""Those that cannot do without compiled code."""
+
+_CODE = Path(__file__).parents[1] / "calib"
+_KEPT = "accumulate._accumulate-*.nbi"
+
+
+def places() -> list[Path]:
+    """Where numba would keep compiled code, in the order in which it looks for a place."""
+    given = os.environ.get(VARIABLE)
+    return [Path(given)] if given else [_CODE, Path.home() / ".cache"]
+
+
+def writable(place: Path) -> bool:
+    """Whether a folder can be written, or made."""
+    there = next(folder for folder in (place, *place.parents) if folder.exists())
+    return there.is_dir() and os.access(there, os.W_OK)
+
+
+def prepare(arguments: Sequence[str]) -> None:
+    """See to a place for compiled code, and say so when this call will have to wait for it.
+
+    To be called before anything compiled is imported; `arguments` are the command line's.
+    """
+    if VARIABLE not in os.environ and not any(writable(place) for place in places()):
+        own = _own_folder()
+        if own is not None:
+            os.environ[VARIABLE] = str(own)
+    asked = next(iter(arguments), "")
+    if asked in VERBS and "--help" not in arguments and not _kept():
+        sys.stderr.write(
+            "first use here: compiling for this processor, once, some twenty seconds\n"
+        )
+        sys.stderr.flush()
+
+
+def _kept() -> bool:
+    user = Path.home() / ".cache" / "numba"
+    folders = [Path(os.environ[VARIABLE])] if VARIABLE in os.environ else [_CODE, user]
+    return any(next(folder.rglob(_KEPT), None) is not None for folder in folders)
+
+
+def _own_folder() -> Path | None:
+    """A folder that nobody else can write: what is kept there is run."""
+    folder = Path(tempfile.gettempdir()) / f"calibration-cell-{os.getuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+    except OSError:
+        return None
+    safe = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
+    return folder if safe and not found.st_mode & 0o077 else None

@@ -1,0 +1,41 @@
+"""Compiled code has a place wherever the program is installed, and the wait for it is told."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from cell import compiled
+
+
+def test_the_first_use_says_what_it_waits_for_and_the_second_does_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(compiled.VARIABLE, str(tmp_path))
+    compiled.prepare(["calibrate", "runs/bench"])
+    assert "compiling for this processor" in capsys.readouterr().err
+    for quiet in (["doctor"], ["calibrate", "--help"], []):
+        compiled.prepare(quiet)
+    (tmp_path / "solver").mkdir()
+    (tmp_path / "solver" / "accumulate._accumulate-72.py311.nbi").touch()
+    compiled.prepare(["calibrate", "runs/bench"])
+    assert capsys.readouterr().err == ""
+
+
+def test_a_read_only_installation_without_a_home_keeps_code_in_a_folder_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(compiled.VARIABLE, "to be forgotten afterwards")
+    monkeypatch.delenv(compiled.VARIABLE)
+    monkeypatch.setattr(compiled, "writable", lambda place: False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    compiled.prepare(["doctor"])
+    (folder,) = tmp_path.iterdir()
+    assert os.environ[compiled.VARIABLE] == str(folder)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    # what others can write is not run
+    monkeypatch.delenv(compiled.VARIABLE)
+    folder.chmod(0o777)
+    compiled.prepare(["doctor"])
+    assert compiled.VARIABLE not in os.environ
