@@ -79,6 +79,9 @@ class Effect:
         The pictures alone show it: a free camera pose for each frame cannot absorb it.
     confounded_with:
         Names of effects that look alike.
+    acts_along:
+        (site, covariate) pairs of `calib.chain.empirical` whose curve this effect is: a remainder
+        there is its law's shape, as long as it is small.
     remedy:
         What the technician can do about it.
     candidates:
@@ -99,6 +102,7 @@ class Effect:
     moving_only: bool = False
     seen_without_robot: bool = False
     confounded_with: tuple[str, ...] = ()
+    acts_along: tuple[tuple[str, str], ...] = ()
     candidates: Callable[[Views], Sequence[Mapping[str, float]]] = _one_candidate
 
     @property

@@ -10,15 +10,18 @@ from calib.chain.effect import Parameter
 from calib.views import FloatArray, Views
 
 TIME_CONSTANT = Parameter("tau_s", "s", 900.0, 20.0, 2e4, role="shape")
+START = Parameter("start_s", "s", 0.0, -1e12, 1e12, role="setting")
+"""The log's clock when the machine was cold; other frames of the run are told by the same."""
 
 
-def warmth(tau_s: float, views: Views) -> FloatArray:
-    """(N,) how far the machine has warmed, zero at the first frame, one in the end."""
-    elapsed = np.nan_to_num(views.t_s - np.nanmin(views.t_s))
+def warmth(tau_s: float, start_s: float, views: Views) -> FloatArray:
+    """(N,) how far the machine has warmed, zero at the start, one in the end."""
+    elapsed = np.nan_to_num(views.t_s - start_s)
     return np.asarray(1.0 - np.exp(-elapsed / max(tau_s, 1e-3)))
 
 
 def warming_candidates(views: Views) -> Sequence[Mapping[str, float]]:
-    """Time constants from a tenth of the run to three times its length."""
-    span = float(np.nanmax(views.t_s) - np.nanmin(views.t_s))
-    return [{"tau_s": span * share} for share in (0.1, 0.3, 1.0, 3.0)]
+    """Time constants from a tenth of the run to three times its length, from its first frame."""
+    start = float(np.nanmin(views.t_s))
+    span = float(np.nanmax(views.t_s)) - start
+    return [{"tau_s": span * share, "start_s": start} for share in (0.1, 0.3, 1.0, 3.0)]

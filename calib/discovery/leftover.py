@@ -16,6 +16,9 @@ ALARM = 2e-3
 _LAW_SHARE = 0.03
 """A remainder in the link of a named effect that is this small a part of it is its law's shape."""
 
+_SHAPE_SHARE = 0.2
+"""The same where it follows the very covariate that the effect acts along."""
+
 _MOST_CURVES = 3
 
 
@@ -34,8 +37,13 @@ def alarms(cells: list[Cell]) -> list[Cell]:
 
 def is_shape_of_law(cell: Cell, search: Search) -> bool:
     """Whether the remainder is but a small part of an effect that is named in the same link."""
-    named = [s for s in search.steps if s.taken.effect.link == cell.link]
-    return any(cell.score.gain < _LAW_SHARE * step.demand for step in named)
+    place = (cell.site, cell.covariate)
+    return any(
+        cell.score.gain
+        < step.demand * (_SHAPE_SHARE if place in step.taken.effect.acts_along else _LAW_SHARE)
+        for step in search.steps
+        if step.taken.effect.link == cell.link
+    )
 
 
 def look_for_leftover(search: Search) -> Leftover:
@@ -49,7 +57,7 @@ def look_for_leftover(search: Search) -> Leftover:
             break
         found.append(cell)
         if cell.curve is None:
-            search.drop_beside_field(cell.site)
+            search.drop_beside_field(cell.site, cell.score.gain)
             break
         if not _carry(search, cell, views):
             break

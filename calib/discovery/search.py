@@ -29,6 +29,17 @@ UNDECIDED = 6.0
 _FITTED_IN_EARNEST = 6
 _MOST_EFFECTS = 6
 
+_EXCHANGE = 2.0
+"""Another effect must lower the criterion by so much to take the place of one that is there."""
+
+_EXCHANGED_AGAINST = 3
+
+_SCORE_FALLS_SHORT = 5.0
+"""A fit in earnest has gained up to about this many times what its score test promised."""
+
+_BESIDE_SHARE = 0.05
+"""Beside a field of shifts a name must gain at least this share of what the field gains."""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -48,9 +59,9 @@ class Step:
     rivals: tuple[tuple[Present, float], ...]
 
 
-def criterion(fit: JointFit, views: Views, choices: int = 1) -> float:
-    """-2 log likelihood and the price of the free numbers, and of picking among shapes."""
-    return -bic(-fit.minus_two_log, fit.parameters, views) + 2.0 * float(np.log(choices))
+def criterion(fit: JointFit, views: Views) -> float:
+    """-2 log likelihood and the price of the free numbers."""
+    return -bic(-fit.minus_two_log, fit.parameters, views)
 
 
 class Search:
@@ -59,15 +70,19 @@ class Search:
     def __init__(self, start: JointFit, fitter: Fitter, branch_price: float = 0.0) -> None:
         self.branch_price = branch_price
         self.fitter, self.views = fitter, fitter.views
-        self.best = Trial(start, criterion(start, fitter.views))
+        self.choices: dict[str, int] = {}
+        self.best = self._trial(start)
         self.steps: list[Step] = []
 
     def run(self) -> JointFit:
-        """Take effects in until none is demanded; then drop those that are not missed."""
-        while len(self.steps) < _MOST_EFFECTS and self._take():
-            pass
-        while self._drop():
-            pass
+        """Take effects in until none is demanded, drop those not missed, exchange the mistaken."""
+        for _ in range(_MOST_EFFECTS):
+            while len(self.steps) < _MOST_EFFECTS and self._take():
+                pass
+            while self._drop():
+                pass
+            if not self._exchange():
+                break
         return self.best.fit
 
     def ranked(self, fit: JointFit) -> list[tuple[Candidate, Score]]:
@@ -90,25 +105,29 @@ class Search:
         return list(best.values())
 
     def _promise(self, candidate: Candidate, score: Score) -> float:
-        return bic(score.gain, score.columns, self.views) - self._price(candidate)
+        effects = self.best.fit.model.effects
+        price = self._price((*effects, candidate.present), candidate) - self._price(effects)
+        return bic(score.gain, score.columns, self.views) - price
 
-    def _price(self, candidate: Candidate) -> float:
-        """Price of picking the best among shapes, and among branches of the arm."""
-        price = 2.0 * float(np.log(candidate.choices))
-        on_joints = "joints_rad" in candidate.effect.needs
-        return price + (self.branch_price if on_joints and not self._joints_paid() else 0.0)
+    def _price(self, effects: Sequence[Present], picked: Candidate | None = None) -> float:
+        """Price of picking the best among shapes, and once among branches of the arm."""
+        choices = dict(self.choices)
+        if picked is not None:
+            choices[picked.effect.label] = picked.choices
+        price = 2.0 * sum(float(np.log(choices.get(p.effect.label, 1))) for p in effects)
+        on_joints = any("joints_rad" in p.effect.needs for p in effects)
+        return price + (self.branch_price if on_joints else 0.0)
 
-    def _joints_paid(self) -> bool:
-        """Whether an effect that is in the model has paid for the choice of branches."""
-        return any("joints_rad" in step.taken.effect.needs for step in self.steps)
+    def _trial(self, fit: JointFit, picked: Candidate | None = None) -> Trial:
+        price = self._price(fit.model.effects, picked)
+        return Trial(fit, criterion(fit, self.views) + price)
 
     def earnest(self, fit: JointFit, picked: Sequence[Candidate]) -> list[tuple[Candidate, Trial]]:
         """Fit each candidate next to what the model has."""
         trials = []
         for candidate in picked:
             tried = self.fitter.with_effects(fit, (*fit.model.effects, candidate.present))
-            value = criterion(tried, self.views) + self._price(candidate)
-            trials.append((candidate, Trial(tried, value)))
+            trials.append((candidate, self._trial(tried, candidate)))
         return sorted(trials, key=lambda pair: pair[1].criterion)
 
     def _take(self) -> bool:
@@ -121,15 +140,53 @@ class Search:
         demand = self.best.criterion - trial.criterion
         if demand < DEMAND:
             return False
-        rivals = tuple((c.present, t.criterion - trial.criterion) for c, t in trials[1:])
-        self.steps.append(Step(candidate.present, trial, demand, rivals))
-        self._settle(trial.fit, candidate.choices)
+        self._record(candidate, trial, demand, trials[1:])
         return True
 
-    def _settle(self, fit: JointFit, choices: int = 1) -> None:
+    def _record(
+        self,
+        candidate: Candidate,
+        trial: Trial,
+        demand: float,
+        others: Sequence[tuple[Candidate, Trial]],
+    ) -> None:
+        rivals = tuple((c.present, t.criterion - trial.criterion) for c, t in others)
+        self.steps.append(Step(candidate.present, trial, demand, rivals))
+        self.choices[candidate.effect.label] = candidate.choices
+        self._settle(trial.fit)
+
+    def _exchange(self) -> bool:
+        """Put another effect in the place of one that was taken before the rest was known.
+
+        The first effect was picked while the others were still missing, and may have stood in
+        for one of them; and the law of a name may have been picked in their company.
+        """
+        if len(self.steps) < 2:
+            return False
+        for step in list(self.steps):
+            rest = tuple(
+                p for p in self.best.fit.model.effects if p.effect.label != step.taken.effect.label
+            )
+            without = self.fitter.with_effects(self.best.fit, rest)
+            base = self._trial(without)
+            needed = (base.criterion - self.best.criterion) / _SCORE_FALLS_SHORT
+            picked = [
+                c
+                for c, score in self.ranked(without)
+                if c.effect.label != step.taken.effect.label and self._promise(c, score) > needed
+            ][:_EXCHANGED_AGAINST]
+            trials = self.earnest(without, picked)
+            if not trials or trials[0][1].criterion > self.best.criterion - _EXCHANGE:
+                continue
+            candidate, trial = trials[0]
+            self.steps.remove(step)
+            self._record(candidate, trial, base.criterion - trial.criterion, trials[1:])
+            return True
+        return False
+
+    def _settle(self, fit: JointFit) -> None:
         """Weigh the corners anew under the model taken, for the next contest."""
-        settled = self.fitter.settled(fit)
-        self.best = Trial(settled, criterion(settled, self.views, choices))
+        self.best = self._trial(self.fitter.settled(fit))
 
     def force(self, effects: Sequence[Present]) -> JointFit:
         """Take exactly these effects, whatever the data say."""
@@ -141,21 +198,25 @@ class Search:
         """Put an effect in without a contest; False where it does not lower the criterion."""
         fit = self.best.fit
         tried = self.fitter.with_effects(fit, (*fit.model.effects, present))
-        value = criterion(tried, self.views, choices)
-        if value > self.best.criterion:
+        if self._trial(tried, Candidate(present, choices)).criterion > self.best.criterion:
             return False
-        self._settle(tried, choices)
+        self.choices[present.effect.label] = choices
+        self._settle(tried)
         return True
 
-    def drop_beside_field(self, site: str) -> None:
-        """Drop what the pictures no longer ask for once a field of shifts is allowed for."""
+    def drop_beside_field(self, site: str, field_gain: float) -> None:
+        """Drop what the pictures no longer ask for once a field of shifts is allowed for.
+
+        What gains but a trifle of what the field gains may fit its edges: no name rests on that.
+        """
         for present in self.best.fit.model.effects:
             if not present.effect.seen_without_robot:
                 continue
             rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
             without = self.fitter.with_effects(self.best.fit, rest)
             beside = picture_score(without, self.views, present, site)
-            if bic(beside.gain, beside.columns, self.views) < DEMAND:
+            worth = bic(beside.gain, beside.columns, self.views)
+            if worth < max(DEMAND, _BESIDE_SHARE * field_gain):
                 self._settle(without)
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
 
@@ -168,8 +229,7 @@ class Search:
         for index in range(len(effects)):
             rest = effects[:index] + effects[index + 1 :]
             tried = self.fitter.with_effects(fit, rest)
-            value = criterion(tried, self.views)
-            if value < self.best.criterion + DEMAND:
+            if self._trial(tried).criterion < self.best.criterion + DEMAND:
                 self._settle(tried)
                 self.steps = [s for s in self.steps if s.taken.effect != effects[index].effect]
                 return True

@@ -21,5 +21,6 @@ EFFECT = Effect(
     act=_act,
     seen_without_robot=True,
     confounded_with=("entrance_pupil_shift", "protective_window"),
+    acts_along=(("radial_distortion", "distance"),),
     remedy="Use one calibration for each working distance, or the twin.",
 )

@@ -11,22 +11,36 @@ from calib.chain.effect import Effect, Parameter
 from calib.chain.walk import Walk
 from calib.views import FloatArray, Views
 
-_NODES = 5
+_NODES = 6
 
 
 def _act(values: FloatArray, walk: Walk) -> None:
     near_m, far_m = values[_NODES - 1], values[_NODES]
     at = np.linspace(0.0, 1.0, _NODES)
     curve = CubicSpline(at, np.concatenate([values[: _NODES - 1], [0.0]]), bc_type="natural")
-    inverse = np.clip(1.0 / walk.focused_m, 0.5 / far_m, 2.0 / near_m)
+    inverse = np.clip(1.0 / walk.focused_m, 0.7 / far_m, 1.4 / near_m)
     where = (1.0 / near_m - inverse) / (1.0 / near_m - 1.0 / far_m)
     growth = 1.0 + curve(where)
     walk.column("alpha_px")[:] *= growth
     walk.column("beta_px")[:] *= growth
 
 
+_SPANS_M = (
+    (0.3, 1.2),
+    (0.2, 0.8),
+    (0.12, 0.5),
+    (0.12, 0.3),
+    (0.2, 0.5),
+    (0.3, 0.75),
+    (0.5, 1.25),
+    (0.5, 2.0),
+    (1.0, 2.5),
+    (1.0, 4.0),
+)
+
+
 def _candidates(views: Views) -> Sequence[Mapping[str, float]]:
-    return ({"near_m": 0.3, "far_m": 1.2}, {"near_m": 0.15, "far_m": 0.7})
+    return [{"near_m": near, "far_m": far} for near, far in _SPANS_M]
 
 
 EFFECT = Effect(
@@ -34,7 +48,7 @@ EFFECT = Effect(
     law="free",
     link="lens",
     physics="The lens moves to focus, so its focal length depends on the distance of the board.",
-    equation="alpha = alpha_far * (1 + natural cubic spline in 1/d through 5 nodes)",
+    equation="alpha = alpha_far * (1 + natural cubic spline in 1/d through 6 nodes)",
     source="focus tables of cine lenses; Willson 1994 (parameters against motor position)",
     parameters=(
         *(Parameter(f"node_{i}", "1", 0.01, -0.5, 0.5) for i in range(1, _NODES)),
@@ -43,6 +57,7 @@ EFFECT = Effect(
     ),
     act=_act,
     confounded_with=("thermal_focal_drift",),
+    acts_along=(("focal_length", "distance"),),
     remedy="Lock the focus, or use the focal length of each distance (the twin has it).",
     candidates=_candidates,
 )

@@ -26,5 +26,6 @@ EFFECT = Effect(
     parameters=(Parameter("k_px_m2", "px m^2", 10.0, -2000.0, 2000.0),),
     act=_act,
     confounded_with=("thermal_focal_drift",),
+    acts_along=(("focal_length", "distance"),),
     remedy="Lock the focus, or use the focal length of each distance (the twin has it).",
 )

@@ -26,5 +26,6 @@ EFFECT = Effect(
     parameters=(Parameter("f_m", "m", 0.015, -0.2, 0.2),),
     act=_act,
     confounded_with=("thermal_focal_drift",),
+    acts_along=(("focal_length", "distance"),),
     remedy="Lock the focus, or use the focal length of each distance (the twin has it).",
 )

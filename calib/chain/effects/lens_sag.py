@@ -22,5 +22,6 @@ EFFECT = Effect(
     parameters=(Parameter("px_per_g", "px/g", 1.5, -100.0, 100.0),),
     act=_act,
     confounded_with=("mount_flex",),
+    acts_along=(("principal_point", "gravity"),),
     remedy="Switch the stabiliser off, clamp the lens, or work in one attitude.",
 )

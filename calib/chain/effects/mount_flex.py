@@ -27,5 +27,6 @@ EFFECT = Effect(
     parameters=(Parameter("rad_per_g", "rad/g", 5e-4, -0.02, 0.02),),
     act=_act,
     confounded_with=("lens_sag", "joint_compliance"),
+    acts_along=(("mounted_pose", "gravity"),),
     remedy="Stiffen the bracket, or let the twin correct flange_from_camera for gravity.",
 )

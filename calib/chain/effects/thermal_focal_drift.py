@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
 from calib.chain.walk import Walk
-from calib.chain.warming import TIME_CONSTANT, warming_candidates, warmth
+from calib.chain.warming import START, TIME_CONSTANT, warming_candidates, warmth
 from calib.views import FloatArray
 
 
 def _act(values: FloatArray, walk: Walk) -> None:
-    growth = 1.0 + values[0] * warmth(values[1], walk.views)
+    growth = 1.0 + values[0] * warmth(values[1], values[2], walk.views)
     walk.column("alpha_px")[:] *= growth
     walk.column("beta_px")[:] *= growth
 
@@ -18,12 +18,17 @@ EFFECT = Effect(
     name="thermal_focal_drift",
     link="lens",
     physics="The lens warms up and its focal length drifts with time.",
-    equation="alpha = alpha_cold * (1 + relative * (1 - exp(-t / tau)))",
+    equation="alpha = alpha_cold * (1 + relative * (1 - exp(-(t - start) / tau)))",
     source="Handel 2007; lens and sensor expansion as in Sci. Rep. 9 (2019), camera warm-up",
-    parameters=(Parameter("relative", "1", 5e-4, -0.05, 0.05), TIME_CONSTANT),
+    parameters=(Parameter("relative", "1", 5e-4, -0.05, 0.05), TIME_CONSTANT, START),
     act=_act,
     needs=("t_s",),
     confounded_with=("thermal_mount_drift",),
+    acts_along=(
+        ("focal_length", "time"),
+        ("focal_length", "order"),
+        ("focal_length", "temperature"),
+    ),
     remedy="Let the camera warm up before the run (three time constants).",
     candidates=warming_candidates,
 )

@@ -1,0 +1,74 @@
+"""Physics by another author's equation: the name is the same, and so are the twin's predictions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib.chain.effects import make_effect
+from calib.chain.empirical import Curve, covariate_named, present_curve, site_named
+from calib.chain.model import walk
+from calib.discovery.diagnose import diagnose
+from calib.discovery.leftover import look_for_leftover
+from calib.discovery.search import Search
+from calib.discovery.start import Fitter
+from calib.views import Views
+from tests.discovery.simulated_runs import NOISE, log, plain_cell, record
+
+LOG = log(40)
+
+
+def names(views: Views) -> set[str]:
+    found = diagnose(views)
+    assert found.verdict == "explained"
+    return {effect.name for effect in found.effects}
+
+
+def test_a_focal_length_that_turns_back_with_the_distance_is_focus_breathing():
+    curve = Curve(site_named("focal_length"), covariate_named("distance"), 0.36, 0.9)
+    state = walk(plain_cell(), LOG)
+    bent = present_curve(curve, state)
+    bent.values[1] = 4e-3  # the second Legendre function: the same at both ends
+    assert names(record(plain_cell().with_effects([bent]), LOG, seed=51)) == {"focus_breathing"}
+
+
+@pytest.mark.parametrize("reference", [0.0, 1.0])
+def test_a_shutter_whose_pose_is_of_the_first_or_the_last_row_is_no_lag_besides(reference):
+    moving = log(40, moving=True)
+    shutter = make_effect("rolling_shutter", {"readout_s": 0.02, "reference": reference})
+    found = names(record(plain_cell().with_effects([shutter]), moving, seed=52))
+    assert found == {"rolling_shutter"}
+
+
+@pytest.mark.parametrize("name", ["thermal_focal_drift", "thermal_mount_drift"])
+def test_a_drift_told_of_some_frames_holds_for_the_others(name):
+    amount = "relative" if name == "thermal_focal_drift" else "x_m"
+    drift = make_effect(name, {amount: 1e-3, "tau_s": 200.0, "start_s": float(LOG.t_s[0])})
+    model = plain_cell().with_effects([drift])
+    late = np.arange(20, 40)
+    every, some = walk(model, LOG), walk(model, LOG.take(late))
+    np.testing.assert_allclose(some.optics, every.optics[late])
+    np.testing.assert_allclose(some.camera_from_board, every.camera_from_board[late])
+
+
+def test_a_clock_that_counts_from_elsewhere_changes_nothing():
+    drift = make_effect("thermal_focal_drift", {"relative": 1.5e-3, "tau_s": 200.0})
+    views = record(plain_cell().with_effects([drift]), LOG, seed=53)
+    assert names(replace(views, t_s=views.t_s + 1.7e9)) == {"thermal_focal_drift"}
+
+
+def test_picking_among_many_shapes_is_paid_for_as_long_as_the_effect_stays():
+    slip = make_effect("board_slip", {"x_m": 1e-3, "at_frame": 18.0})
+    fitter = Fitter(record(plain_cell().with_effects([slip]), LOG, seed=54))
+    search = Search(fitter.fit(plain_cell(), NOISE), fitter)
+    search.run()
+    (step,) = search.steps
+    assert step.taken.effect.name == "board_slip"
+    free_of_price = search.best.criterion - 2.0 * np.log(search.choices["board_slip"])
+    assert search.choices["board_slip"] > 20
+    search.choices.clear()
+    search.drop_beside_field("image_field", 0.0)
+    assert search._trial(search.best.fit).criterion == pytest.approx(free_of_price)
+    assert look_for_leftover(search).cells == ()
