@@ -86,6 +86,8 @@ class Effect:
         What the technician can do about it.
     candidates:
         Values of shapes and settings worth trying on these views.
+    separable:
+        Whether some of the amounts alone make sense; not so for the nodes of a curve.
     """
 
     name: str
@@ -104,6 +106,7 @@ class Effect:
     confounded_with: tuple[str, ...] = ()
     acts_along: tuple[tuple[str, str], ...] = ()
     candidates: Callable[[Views], Sequence[Mapping[str, float]]] = _one_candidate
+    separable: bool = True
 
     @property
     def label(self) -> str:
@@ -141,10 +144,14 @@ class Effect:
 
 @dataclass(frozen=True)
 class Present:
-    """An effect with its values: part of a cell model."""
+    """An effect with its values: part of a cell model.
+
+    `held` are the places of amounts that are not fitted: a fault of one joint needs no others.
+    """
 
     effect: Effect
     values: FloatArray
+    held: frozenset[int] = frozenset()
 
     @property
     def absent(self) -> bool:
@@ -152,6 +159,15 @@ class Present:
         return not any(
             value and parameter.role == "amount"
             for value, parameter in zip(self.values, self.effect.parameters, strict=True)
+        )
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """Places of the amounts that can be fitted and are."""
+        return tuple(
+            k
+            for k, p in enumerate(self.effect.parameters)
+            if p.role == "amount" and p.identifiable and k not in self.held
         )
 
     def as_mapping(self) -> dict[str, float]:

@@ -264,6 +264,7 @@ def empirical(curve: Curve, functions: int) -> Effect:
             Parameter("period", "s", curve.period or 0.0, 0.0, 1e9, role="setting"),
         ),
         act=act,
+        separable=False,
         remedy="Find out what changes with it; until then the twin carries the curve.",
     )
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,11 +19,12 @@ _MANY_SHAPES = 16
 class Candidate:
     """An effect with the shape and settings to try, and how many such were tried.
 
-    `choices` counts the shapes among which the best was picked: the pick has its price.
+    `choices` counts the shapes, and the sets of amounts, among which the best was picked: the
+    pick has its price.
     """
 
     present: Present
-    choices: int
+    choices: float
 
     @property
     def effect(self) -> Effect:
@@ -40,6 +41,7 @@ def unseen(views: Views) -> dict[str, str]:
 def candidates(model: CellModel, views: Views) -> Iterator[Candidate]:
     """Every effect that is not in the model yet and that the recording could show."""
     present = {p.effect.name for p in model.effects}
+    yield from (Candidate(rest, 1.0) for rest in map(_held_back, model.effects) if rest.free)
     for effect in catalogue():
         if effect.missing(views) is not None or effect.name in present:
             continue
@@ -53,11 +55,28 @@ def candidates(model: CellModel, views: Views) -> Iterator[Candidate]:
             yield Candidate(Present(effect, effect.values(shape)), len(shapes))
 
 
+def _held_back(present: Present) -> Present:
+    """The amounts of an effect in the model that are held there, and only those, at zero."""
+    effect = present.effect
+    values = np.where([p.role == "amount" for p in effect.parameters], 0.0, present.values)
+    return Present(effect, values, frozenset(present.free))
+
+
+def joined(effects: Sequence[Present], more: Present) -> tuple[Present, ...]:
+    """The effects with one more; or, where it is there already, with its further amounts freed."""
+    if all(p.effect.label != more.effect.label for p in effects):
+        return (*effects, more)
+    return tuple(
+        replace(p, held=p.held & more.held) if p.effect.label == more.effect.label else p
+        for p in effects
+    )
+
+
 def finer(candidate: Candidate, views: Views) -> list[Candidate]:
     """Return the shapes near one of a coarse scan, itself included."""
     effect = candidate.effect
     shapes = list(effect.candidates(views))
-    if len(shapes) <= _MANY_SHAPES:
+    if len(shapes) <= _MANY_SHAPES or candidate.choices == 1.0:
         return [candidate]
     values = [effect.values(shape) for shape in shapes]
     distance = [float(np.abs(v - candidate.present.values).sum()) for v in values]

@@ -195,7 +195,7 @@ def _values(twin: JointFit, index: int) -> dict[str, Value]:
     return {
         p.name: Value(float(v), sigma.get(k, 0.0), p.unit)
         for k, (p, v) in enumerate(zip(present.effect.parameters, present.values, strict=True))
-        if p.role != "amount" or p.identifiable
+        if p.role != "amount" or k in present.free
     }
 
 

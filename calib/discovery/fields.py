@@ -6,7 +6,7 @@ dent in the image or a bump on the board stands out wherever it is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import f as f_distribution
@@ -103,7 +103,7 @@ def picture_score(fit: JointFit, views: Views, present: Present, site: str) -> S
         `IMAGE_FIELD` or `BOARD_HEIGHT`.
     """
     blank = np.where([p.role == "amount" for p in present.effect.parameters], 0.0, present.values)
-    _, found, _, first = extended(fit, views, (Present(present.effect, blank),))
+    _, found, _, first = extended(fit, views, (replace(present, values=blank),))
     fields = _fields(found, views, _FINE_ORDER)
     known, columns = fields.base[..., : 6 + first], fields.base[..., 6 + first :]
     field = fields.image if site == IMAGE_FIELD else fields.height

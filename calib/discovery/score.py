@@ -8,7 +8,7 @@ have done. On raw pixel residuals the same test would cry out at every clean rec
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,12 +44,16 @@ class Score:
         Of the gain under the null, by an F distribution with the frames' six numbers each.
     step:
         (e,) one-step estimate of the columns' amounts.
+    information, gradient:
+        (e, e) and (e,) of the columns, all else projected out.
     """
 
     gain: float
     columns: int
     p_value: float
     step: FloatArray
+    information: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    gradient: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 def pose_numbers(views: Views) -> int:
@@ -87,9 +91,10 @@ def group_score(information: FloatArray, score: FloatArray, views: Views, price:
     gain, columns = float(along @ along), int(kept.sum()) + price
     step = (vector[:, kept] / np.sqrt(value[kept])) @ along / diagonal
     if columns == 0:
-        return Score(0.0, 0, 1.0, step)
+        return Score(0.0, 0, 1.0, step, information, score)
     freedom = max(pose_numbers(views) - columns - 14, 4)
-    return Score(gain, columns, float(f_distribution.sf(gain / columns, columns, freedom)), step)
+    p_value = float(f_distribution.sf(gain / columns, columns, freedom))
+    return Score(gain, columns, p_value, step, information, score)
 
 
 def extended(

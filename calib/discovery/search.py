@@ -8,20 +8,24 @@ by their likelihood.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.chain.effect import Present
-from calib.discovery.candidates import Candidate, candidates, finer
+from calib.discovery.candidates import Candidate, candidates, finer, joined
 from calib.discovery.fields import picture_score
 from calib.discovery.score import Score, bic, score_effects
+from calib.discovery.sparse import pick
 from calib.discovery.start import Fitter
 from calib.solver.joint import JointFit
 from calib.views import Views
 
 DEMAND = 8.0
 """An effect must lower the Bayesian criterion by this much to be named."""
+
+_MORE_OF_IT = 2.0
+"""Further amounts of an effect that is named must lower it by this much to be freed as well."""
 
 UNDECIDED = 6.0
 """Rivals within this much of the best cannot be told apart by these data."""
@@ -70,8 +74,8 @@ class Search:
     def __init__(self, start: JointFit, fitter: Fitter, branch_price: float = 0.0) -> None:
         self.branch_price = branch_price
         self.fitter, self.views = fitter, fitter.views
-        self.choices: dict[str, int] = {}
-        self.best = self._trial(start)
+        self.choices: dict[str, float] = {}
+        self.best = Trial(start, criterion(start, fitter.views))
         self.steps: list[Step] = []
 
     def run(self) -> JointFit:
@@ -98,25 +102,39 @@ class Search:
     ) -> list[tuple[Candidate, Score]]:
         scores = score_effects(fit, self.views, [c.present for c in tried])
         best: dict[str, tuple[Candidate, Score]] = {}
-        for candidate, score in zip(tried, scores, strict=True):
+        for whole, all_amounts in zip(tried, scores, strict=True):
+            candidate, score = self._picked(whole, all_amounts)
             label = candidate.effect.label
             if label not in best or self._promise(candidate, score) > self._promise(*best[label]):
                 best[label] = (candidate, score)
         return list(best.values())
 
+    def _picked(self, whole: Candidate, score: Score) -> tuple[Candidate, Score]:
+        """The same effect with the amounts that the data ask for."""
+        picked = pick(whole.present, score, self.views)
+        choices = whole.choices * float(np.exp(picked.ways))
+        found = replace(score, gain=picked.gain, columns=picked.columns)
+        return Candidate(picked.present, choices), found
+
     def _promise(self, candidate: Candidate, score: Score) -> float:
         effects = self.best.fit.model.effects
-        price = self._price((*effects, candidate.present), candidate) - self._price(effects)
+        price = self._price(joined(effects, candidate.present), candidate) - self._price(effects)
         return bic(score.gain, score.columns, self.views) - price
 
     def _price(self, effects: Sequence[Present], picked: Candidate | None = None) -> float:
         """Price of picking the best among shapes, and once among branches of the arm."""
         choices = dict(self.choices)
         if picked is not None:
-            choices[picked.effect.label] = picked.choices
+            choices[picked.effect.label] = self._choices(picked)
         price = 2.0 * sum(float(np.log(choices.get(p.effect.label, 1))) for p in effects)
         on_joints = any("joints_rad" in p.effect.needs for p in effects)
         return price + (self.branch_price if on_joints else 0.0)
+
+    def _choices(self, picked: Candidate) -> float:
+        """Among how many its effect was picked, with what was held back and is now picked too."""
+        label = picked.effect.label
+        there = any(p.effect.label == label for p in self.best.fit.model.effects)
+        return picked.choices * (self.choices.get(label, 1.0) if there else 1.0)
 
     def _trial(self, fit: JointFit, picked: Candidate | None = None) -> Trial:
         price = self._price(fit.model.effects, picked)
@@ -126,7 +144,7 @@ class Search:
         """Fit each candidate next to what the model has."""
         trials = []
         for candidate in picked:
-            tried = self.fitter.with_effects(fit, (*fit.model.effects, candidate.present))
+            tried = self.fitter.with_effects(fit, joined(fit.model.effects, candidate.present))
             trials.append((candidate, self._trial(tried, candidate)))
         return sorted(trials, key=lambda pair: pair[1].criterion)
 
@@ -134,14 +152,19 @@ class Search:
         fit = self.best.fit
         promising = [c for c, s in self.ranked(fit) if self._promise(c, s) > 0.0]
         trials = self.earnest(fit, promising[:_FITTED_IN_EARNEST])
-        if not trials:
-            return False
-        candidate, trial = trials[0]
-        demand = self.best.criterion - trial.criterion
-        if demand < DEMAND:
-            return False
-        self._record(candidate, trial, demand, trials[1:])
-        return True
+        present = {p.effect.label for p in fit.model.effects}
+        for at, (candidate, trial) in enumerate(trials):
+            demand = self.best.criterion - trial.criterion
+            if candidate.effect.label in present:
+                if demand < _MORE_OF_IT:
+                    continue
+                self.choices[candidate.effect.label] = self._choices(candidate)
+                self._settle(trial.fit)
+                return True
+            if demand >= DEMAND:
+                self._record(candidate, trial, demand, trials[at + 1 :])
+                return True
+        return False
 
     def _record(
         self,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.chain import rigid
-from calib.chain.effect import Effect, Present
+from calib.chain.effect import Present
 from calib.chain.kinematics import ArmKinematics
 from calib.chain.model import CellModel, Journey
 from calib.chain.optics import COLUMN
@@ -40,7 +40,8 @@ class Unknown:
     prior_sigma: float = np.inf
 
 
-def _free_of(effect: Effect, at: int) -> list[Unknown]:
+def _free_of(present: Present, at: int) -> list[Unknown]:
+    effect = present.effect
     return [
         Unknown(
             f"{effect.label}.{p.name}",
@@ -50,7 +51,7 @@ def _free_of(effect: Effect, at: int) -> list[Unknown]:
             PRIOR_WIDTH * p.typical if p.role == "amount" else np.inf,
         )
         for k, p in enumerate(effect.parameters)
-        if p.role != "setting" and p.identifiable
+        if p.role != "setting" and p.identifiable and k not in present.held
     ]
 
 
@@ -66,7 +67,7 @@ def unknowns_of(
                 axis = "xyz"[k % 3] if k < 3 else "r" + "xyz"[k % 3]
                 free.append(Unknown(f"{frame}.{axis}", unit, 1e-2, (frame, k, 0)))
     for at, present in enumerate(model.effects):
-        free += _free_of(present.effect, at)
+        free += _free_of(present, at)
     return tuple(free)
 
 
@@ -133,7 +134,7 @@ def _nudged(present: Present, k: int, amount: float) -> Present:
     parameter = present.effect.parameters[k]
     values = present.values.copy()
     values[k] = min(max(values[k] + amount, parameter.low), parameter.high)
-    return Present(present.effect, values)
+    return replace(present, values=values)
 
 
 @dataclass(frozen=True)

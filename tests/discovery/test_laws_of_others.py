@@ -10,9 +10,8 @@ import pytest
 from calib.chain.effects import make_effect
 from calib.chain.empirical import Curve, covariate_named, present_curve, site_named
 from calib.chain.model import walk
-from calib.discovery.diagnose import diagnose
 from calib.discovery.leftover import look_for_leftover
-from calib.discovery.search import Search
+from calib.discovery.search import Search, criterion
 from calib.discovery.start import Fitter
 from calib.views import Views
 from tests.discovery.simulated_runs import NOISE, log, plain_cell, record
@@ -20,10 +19,18 @@ from tests.discovery.simulated_runs import NOISE, log, plain_cell, record
 LOG = log(40)
 
 
-def names(views: Views) -> set[str]:
-    found = diagnose(views)
-    assert found.verdict == "explained"
-    return {effect.name for effect in found.effects}
+def searched(views: Views) -> Search:
+    fitter = Fitter(views)
+    search = Search(fitter.fit(plain_cell(), NOISE), fitter)
+    search.run()
+    return search
+
+
+def names(views: Views) -> list[str]:
+    """What is named; nothing must be left over."""
+    found = look_for_leftover(searched(views))
+    assert found.cells == ()
+    return [present.effect.name for present in found.search.best.fit.model.effects]
 
 
 def test_a_focal_length_that_turns_back_with_the_distance_is_focus_breathing():
@@ -31,7 +38,7 @@ def test_a_focal_length_that_turns_back_with_the_distance_is_focus_breathing():
     state = walk(plain_cell(), LOG)
     bent = present_curve(curve, state)
     bent.values[1] = 4e-3  # the second Legendre function: the same at both ends
-    assert names(record(plain_cell().with_effects([bent]), LOG, seed=51)) == {"focus_breathing"}
+    assert names(record(plain_cell().with_effects([bent]), LOG, seed=51)) == ["focus_breathing"]
 
 
 @pytest.mark.parametrize("reference", [0.0, 1.0])
@@ -39,7 +46,7 @@ def test_a_shutter_whose_pose_is_of_the_first_or_the_last_row_is_no_lag_besides(
     moving = log(40, moving=True)
     shutter = make_effect("rolling_shutter", {"readout_s": 0.02, "reference": reference})
     found = names(record(plain_cell().with_effects([shutter]), moving, seed=52))
-    assert found == {"rolling_shutter"}
+    assert found == ["rolling_shutter"]
 
 
 @pytest.mark.parametrize("name", ["thermal_focal_drift", "thermal_mount_drift"])
@@ -56,19 +63,31 @@ def test_a_drift_told_of_some_frames_holds_for_the_others(name):
 def test_a_clock_that_counts_from_elsewhere_changes_nothing():
     drift = make_effect("thermal_focal_drift", {"relative": 1.5e-3, "tau_s": 200.0})
     views = record(plain_cell().with_effects([drift]), LOG, seed=53)
-    assert names(replace(views, t_s=views.t_s + 1.7e9)) == {"thermal_focal_drift"}
+    assert names(replace(views, t_s=views.t_s + 1.7e9)) == ["thermal_focal_drift"]
 
 
 def test_picking_among_many_shapes_is_paid_for_as_long_as_the_effect_stays():
     slip = make_effect("board_slip", {"x_m": 1e-3, "at_frame": 18.0})
-    fitter = Fitter(record(plain_cell().with_effects([slip]), LOG, seed=54))
-    search = Search(fitter.fit(plain_cell(), NOISE), fitter)
-    search.run()
+    views = record(plain_cell().with_effects([slip]), LOG, seed=54)
+    search = searched(views)
     (step,) = search.steps
     assert step.taken.effect.name == "board_slip"
-    free_of_price = search.best.criterion - 2.0 * np.log(search.choices["board_slip"])
-    assert search.choices["board_slip"] > 20
-    search.choices.clear()
-    search.drop_beside_field("image_field", 0.0)
-    assert search._trial(search.best.fit).criterion == pytest.approx(free_of_price)
-    assert look_for_leftover(search).cells == ()
+    paid = search.best.criterion - criterion(search.best.fit, views)
+    assert paid > 2.0 * np.log(30)
+
+
+@pytest.mark.parametrize("part", ["_lever_x", "_turn"])
+def test_a_bracket_that_turns_about_another_axis_is_still_flex(part):
+    flex = make_effect("mount_flex", {"rad_per_g": 3e-4, f"rad_per_g{part}": 6e-4})
+    views = record(plain_cell().with_effects([flex]), LOG, seed=55)
+    assert names(views) == ["mount_flex"]
+
+
+def test_play_in_one_joint_is_seen_at_a_size_at_which_six_would_not_be():
+    play = make_effect("joint_backlash", {"play_rad_3": 8e-5})
+    search = searched(record(plain_cell().with_effects([play]), LOG, seed=56))
+    (present,) = search.best.fit.model.effects
+    assert present.effect.name == "joint_backlash"
+    fitted = {present.effect.parameters[k].name for k in present.free}
+    assert "play_rad_3" in fitted
+    assert len(fitted) < 4

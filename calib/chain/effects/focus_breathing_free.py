@@ -60,4 +60,5 @@ EFFECT = Effect(
     acts_along=(("focal_length", "distance"),),
     remedy="Lock the focus, or use the focal length of each distance (the twin has it).",
     candidates=_candidates,
+    separable=False,
 )

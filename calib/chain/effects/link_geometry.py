@@ -9,7 +9,10 @@ from calib.chain.walk import Walk
 from calib.views import FloatArray
 
 _THETA, _D, _A, _ALPHA = range(4)
-_LENGTHS = (("d4_m", 3, _D), ("d5_m", 4, _D), ("a2_m", 1, _A), ("a3_m", 2, _A))
+_LENGTHS = (
+    *(("d4_m", 3, _D), ("d5_m", 4, _D)),
+    *((f"a{j}_m", j - 1, _A) for j in (2, 3, 1, 4, 5)),
+)
 _TWISTS = tuple((f"twist_rad_{j}", j - 1, _ALPHA) for j in range(1, 6))
 _ENTRIES = _LENGTHS + _TWISTS
 
@@ -25,7 +28,7 @@ EFFECT = Effect(
     name="link_geometry",
     link="arm",
     physics="The arm's links are longer, shorter or more twisted than its drawing says.",
-    equation="Denavit-Hartenberg rows: d4, d5, a2, a3 and the twists alpha1..alpha5 are changed",
+    equation="Denavit-Hartenberg rows: d4, d5, a1..a5 and the twists alpha1..alpha5 are changed",
     source="Denavit, Hartenberg 1955; sizes from makers' factory calibrations",
     parameters=(
         *(Parameter(name, "m", 3e-4, -0.02, 0.02) for name, _, _ in _LENGTHS),

@@ -1,4 +1,8 @@
-"""Mount: the bracket bends as gravity turns around it."""
+"""Mount: the bracket bends as gravity turns around it.
+
+A camera out along the flange's axis leans by `rad_per_g`; one that sits aside has a lever aside,
+and a bracket that is not symmetric turns about the direction of gravity itself.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +13,11 @@ from calib.chain.effect import Effect, Parameter
 from calib.chain.walk import DOWN_IN_BASE, Walk
 from calib.views import FloatArray
 
-_AXIS = np.array([0.0, 0.0, 1.0])
-
 
 def _act(values: FloatArray, walk: Walk) -> None:
     gravity = np.einsum("nji,j->ni", walk.base_from_flange[:, :3, :3], DOWN_IN_BASE)
-    bend = values[0] * np.cross(_AXIS, gravity)
+    lever = values[[1, 2, 0]]
+    bend = np.cross(lever, gravity) + values[3] * gravity
     walk.flange_from_mounted = rigid.compose(bend, np.zeros_like(bend)) @ walk.flange_from_mounted
 
 
@@ -22,9 +25,12 @@ EFFECT = Effect(
     name="mount_flex",
     link="mount",
     physics="The bracket between flange and camera bends under the camera's weight.",
-    equation="rotation at the flange = rad_per_g * (flange z axis x gravity direction)",
+    equation="rotation at the flange = lever x gravity + turn * gravity; lever = rad_per_g along z",
     source="cantilever with a tip mass: slope proportional to the transverse load (Roark, ch. 8)",
-    parameters=(Parameter("rad_per_g", "rad/g", 5e-4, -0.02, 0.02),),
+    parameters=tuple(
+        Parameter(f"rad_per_g{part}", "rad/g", 5e-4, -0.02, 0.02)
+        for part in ("", "_lever_x", "_lever_y", "_turn")
+    ),
     act=_act,
     confounded_with=("lens_sag", "joint_compliance"),
     acts_along=(("mounted_pose", "gravity"),),

@@ -54,16 +54,21 @@ def choose_branches(fit: JointFit, views: Views, kinematics: ArmKinematics) -> B
     """
     branches = _all_branches(views, kinematics)
     counts = np.isfinite(branches).all(axis=2).sum(axis=1)
-    best_cost, best = np.inf, views.joints_rad
+    numbers = 6.0 * len(views)
+    price = 2.0 * float(np.log(np.maximum(counts, 1)).sum())
+    best_gain, best = price, None
     for fault in (_offsets, _sags, _waves):
         problem = _problem(fit, branches, kinematics, fault)
+        sound = _without_fault(problem)
         for start in _starts(branches, views.joints_rad):
             cost, chosen = _alternate(problem, start)
-            cost += problem.columns.shape[3] * np.log(6.0 * len(views))
-            if cost < best_cost:
-                best_cost = cost
+            gain = numbers * float(np.log(sound / max(cost, 1e-9)))
+            gain -= problem.columns.shape[3] * float(np.log(numbers))
+            if gain > best_gain:
+                best_gain = gain
                 best = branches[np.arange(len(views)), chosen]
-    price = 2.0 * float(np.log(np.maximum(counts, 1)).sum())
+    if best is None:
+        return Branches(views.joints_rad, 0.0)
     known = np.isfinite(best).all(axis=1, keepdims=True)
     return Branches(np.where(known, best, views.joints_rad), price)
 
@@ -143,6 +148,17 @@ def _starts(branches: FloatArray, first: FloatArray) -> list[FloatArray]:
         agree = np.where(known, (kinds == wanted).sum(axis=2), -1)
         starts.append(np.argmax(agree, axis=1))
     return starts
+
+
+def _without_fault(problem: _Problem) -> float:
+    """Cost of the errors with hand-eye and board pose fitted, and no fault."""
+    known = np.asarray(np.isfinite(problem.branches).all(axis=2)).any(axis=1)
+    design = problem.nuisance[known].reshape(6 * int(known.sum()), -1)
+    error = problem.error[known].ravel()
+    size = np.linalg.norm(design, axis=0)
+    size[size == 0.0] = 1.0
+    solved = np.linalg.lstsq(design / size, error, rcond=1e-9)[0] / size
+    return float(np.sum((error - design @ solved) ** 2))
 
 
 def _alternate(problem: _Problem, chosen: FloatArray) -> tuple[float, FloatArray]:

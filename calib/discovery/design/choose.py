@@ -100,8 +100,7 @@ def contest(
     noise:
         Of corners and flange.
     """
-    free = [p.role == "amount" and p.identifiable for p in first.effect.parameters]
-    amounts = first.values[np.array(free)]
+    amounts = first.values[list(first.free)]
     shapes: Sequence[FloatArray] = [second.values(s) for s in second.candidates(views)]
     step = max(1, -(-len(shapes) // _MOST_SHAPES))
     tried = [
