@@ -19,6 +19,11 @@ from calib.solver.joint import JointFit
 from calib.views import FloatArray, Views
 
 _ROUNDS = 12
+
+_PRICE = 4.0
+"""Of a choice, per logarithm of what there was to choose from: twice what a single fit's would
+cost, for the choice follows the noise as well as the fault."""
+
 _INNER = slice(1, 5)
 
 
@@ -55,7 +60,7 @@ def choose_branches(fit: JointFit, views: Views, kinematics: ArmKinematics) -> B
     branches = _all_branches(views, kinematics)
     counts = np.isfinite(branches).all(axis=2).sum(axis=1)
     numbers = 6.0 * len(views)
-    price = 2.0 * float(np.log(np.maximum(counts, 1)).sum())
+    price = _PRICE * float(np.log(np.maximum(counts, 1)).sum())
     best_gain, best = price, None
     for fault in (_offsets, _sags, _waves):
         problem = _problem(fit, branches, kinematics, fault)

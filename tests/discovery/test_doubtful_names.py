@@ -1,0 +1,72 @@
+"""Names that rest on little are not told: beside a dent, and on branches that were guessed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from calib.chain.effects import make_effect
+from calib.chain.model import kinematics_of
+from calib.discovery.bookkeeping.branches import Branches, choose_branches
+from calib.discovery.books import keep_books
+from calib.discovery.fields import field_scores
+from calib.discovery.search import Search
+from calib.discovery.start import Fitter, fit_start
+from calib.solver.noise import Noise
+from calib.views import Views
+from tests.discovery.simulated_runs import NOISE, log, plain_cell, record
+
+LOG = log(30)
+WARP = make_effect("board_warp", {"bend_x_m": 8e-4})
+WINDOW = make_effect("protective_window", {})
+
+
+def widely_dented() -> Views:
+    """A bent board, and a dent a quarter of the picture wide in what the sensor shows."""
+    made = record(plain_cell().with_effects([WARP]), LOG, seed=61)
+    off = made.corners_px - np.array([1450.0, 1000.0])
+    fall = np.exp(-0.5 * (off**2).sum(axis=2, keepdims=True) / 250.0**2)
+    return replace(made, corners_px=made.corners_px + 2.0 * off / 250.0 * fall)
+
+
+def test_a_lens_effect_that_fits_the_edge_of_a_dent_loses_its_name_and_a_bent_board_keeps_it():
+    fitter = Fitter(widely_dented())
+    search = Search(fitter.fit(plain_cell(), NOISE), fitter)
+    search.force([WARP, WINDOW])
+    field = field_scores(search.best.fit, fitter.views)[0]
+    assert field.score.p_value < 1e-20
+    search.drop_beside_field(field.site, field.score.gain)
+    assert [p.effect.name for p in search.best.fit.model.effects] == ["board_warp"]
+
+
+def branches_of(views: Views) -> tuple[Views, Branches]:
+    nothing = np.full_like(views.joints_rad, np.nan)
+    bare = replace(
+        views,
+        joints_rad=nothing,
+        joint_velocity_rad_s=nothing,
+        approach_joints_rad=nothing,
+    )
+    books = keep_books(bare, bare)
+    kinematics = kinematics_of(books.views)
+    assert kinematics is not None
+    fit = fit_start(Fitter(books.views), books.free, np.ones(len(books.views), dtype=bool))
+    return books.views, choose_branches(fit, books.views, kinematics)
+
+
+def test_a_sound_arm_without_joints_keeps_the_branches_that_were_guessed_first():
+    first, chosen = branches_of(record(plain_cell(), LOG, seed=62))
+    np.testing.assert_array_equal(chosen.joints_rad, first.joints_rad)
+    assert chosen.price == 0.0
+
+
+def test_a_faulty_arm_without_joints_is_put_on_its_true_branches_at_a_price():
+    offset = make_effect("joint_zero_offset", {"offset_rad_2": 2e-3, "offset_rad_3": -2e-3})
+    quiet = Noise(corner_px=0.03, flange_m=4e-6, flange_rad=1e-5)
+    made = record(plain_cell().with_effects([offset]), LOG, seed=63, noise=quiet)
+    _, chosen = branches_of(made)
+    true = LOG.joints_rad[np.searchsorted(LOG.frame, made.frame)]
+    turn = np.abs(np.sin(0.5 * (chosen.joints_rad - true))).max(axis=1)
+    assert np.mean(turn < 1e-2) > 0.9
+    assert chosen.price > 20.0
