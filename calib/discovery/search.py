@@ -230,15 +230,18 @@ class Search:
     def drop_beside_field(self, site: str, field_gain: float) -> None:
         """Drop what the pictures no longer ask for once a field of shifts is allowed for.
 
-        What gains but a trifle of what the field gains may fit its edges: no name rests on that.
+        What gains but a trifle of what the field gains may fit its edges, or the poses that it
+        bends: no name rests on that.
         """
+        demand = {step.taken.effect.label: step.demand for step in self.steps}
         for present in self.best.fit.model.effects:
-            if not present.effect.seen_without_robot:
-                continue
             rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
             without = self.fitter.with_effects(self.best.fit, rest)
-            beside = picture_score(without, self.views, present, site)
-            worth = bic(beside.gain, beside.columns, self.views)
+            if present.effect.seen_without_robot:
+                beside = picture_score(without, self.views, present, site)
+                worth = bic(beside.gain, beside.columns, self.views)
+            else:
+                worth = demand.get(present.effect.label, np.inf)
             if worth < max(DEMAND, _BESIDE_SHARE * field_gain):
                 self._settle(without)
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]

@@ -41,14 +41,6 @@ def test_a_focal_length_that_turns_back_with_the_distance_is_focus_breathing():
     assert names(record(plain_cell().with_effects([bent]), LOG, seed=51)) == ["focus_breathing"]
 
 
-@pytest.mark.parametrize("reference", [0.0, 1.0])
-def test_a_shutter_whose_pose_is_of_the_first_or_the_last_row_is_no_lag_besides(reference):
-    moving = log(40, moving=True)
-    shutter = make_effect("rolling_shutter", {"readout_s": 0.02, "reference": reference})
-    found = names(record(plain_cell().with_effects([shutter]), moving, seed=52))
-    assert found == ["rolling_shutter"]
-
-
 @pytest.mark.parametrize("name", ["thermal_focal_drift", "thermal_mount_drift"])
 def test_a_drift_told_of_some_frames_holds_for_the_others(name):
     amount = "relative" if name == "thermal_focal_drift" else "x_m"
