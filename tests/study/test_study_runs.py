@@ -238,12 +238,14 @@ monte_carlo:
 
 
 def test_power_counts_what_the_diagnosis_names(tmp_path: Path, scheduler: str) -> None:
-    content = "power: {plan: small.plan.yaml, seeds: 1, effects: [{name: mount_flex}]}\n"
+    flexing = "{name: mount_flex, parameters: {rad_per_g: 0.0005}}"
+    content = f"power: {{plan: small.plan.yaml, seeds: 1, effects: [{flexing}]}}\n"
     outcome = run_study(study(tmp_path, content), tmp_path / "out", scheduler=scheduler)
     plain, flex = outcome.summary["effects"]
     assert (plain["detected"]["share"], flex["detected"]["share"]) == (0.0, 1.0)
     assert flex["alone"]["hits"] == flex["alone"]["runs"] == 1
-    (told,) = next(row for row in outcome.rows if row["effect"] == "mount_flex")["estimates"]
+    estimates = next(row for row in outcome.rows if row["effect"] == "mount_flex")["estimates"]
+    told = next(estimate for estimate in estimates if estimate["quantity"] == "rad_per_g")
     assert told["truth"] == 0.0005
     assert abs(told["z"]) < 5
 
