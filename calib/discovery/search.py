@@ -246,6 +246,20 @@ class Search:
                 self._settle(without)
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
 
+    def drop_waves(self, joints: set[str]) -> None:
+        """Drop the periodic error of joints that follow their own angle by a curve without a name.
+
+        A kink is soaked up by a wave and a remainder: where there is a remainder, it was no wave.
+        """
+        for present in self.best.fit.model.effects:
+            if present.effect.name != "joint_periodic_error":
+                continue
+            names = (present.effect.parameters[k].name for k in present.free)
+            if joints & {f"joint_{name.rsplit('_', 1)[1]}" for name in names}:
+                rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
+                self._settle(self.fitter.with_effects(self.best.fit, rest))
+                self.steps = [s for s in self.steps if s.taken.effect != present.effect]
+
     def _drop(self) -> bool:
         """Drop the effect that the others have made needless, if there is one."""
         fit = self.best.fit

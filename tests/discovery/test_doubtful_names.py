@@ -70,3 +70,14 @@ def test_a_faulty_arm_without_joints_is_put_on_its_true_branches_at_a_price():
     turn = np.abs(np.sin(0.5 * (chosen.joints_rad - true))).max(axis=1)
     assert np.mean(turn < 1e-2) > 0.9
     assert chosen.price > 20.0
+
+
+def test_a_wave_loses_its_name_where_its_joint_needs_a_curve_besides():
+    wave = make_effect("joint_periodic_error", {"sin_rad_3": 3e-4, "cycles_per_turn": 1.0})
+    fitter = Fitter(record(plain_cell().with_effects([wave]), LOG, seed=64))
+    search = Search(fitter.fit(plain_cell(), NOISE), fitter)
+    search.force([wave])
+    search.drop_waves(set())
+    assert [p.effect.name for p in search.best.fit.model.effects] == ["joint_periodic_error"]
+    search.drop_waves({"joint_3"})
+    assert search.best.fit.model.effects == ()
