@@ -4,7 +4,8 @@
 
 Both shipped plans, simulated. In every run a calibration is made from the whole plan with its own
 noise; then eight views of the plan (`choose_views`) are taken anew with other noise, once for each
-of the changes below and some times more for none; in half of the runs the board has been moved by 6 mm.
+of the changes below and some times more for none; the board has been moved by 6 mm in every other
+run.
 """
 
 from __future__ import annotations
