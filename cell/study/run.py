@@ -98,10 +98,12 @@ def run_study(
     with StudyFolder.opened(folder, study, kind.schema) as store:
         done = store.keys()
         missing = [task for task in tasks if task.key not in done]
-        listener(len(tasks) - len(missing), len(tasks))
+        begun = len(tasks) - len(missing)
+        listener(begun, len(tasks))
         if missing:
             with workers_of(scheduler, workers) as client:
-                _Shift(study, client, store, stop, listener, len(tasks)).run(missing)
+                shift = _Shift(study, client, store, stop, listener, begun, len(tasks))
+                shift.run(missing)
         rows = tuple(store.rows())
     return Outcome(folder, kind, rows)
 
@@ -119,6 +121,7 @@ class _Shift:
     store: StudyFolder
     stop: StopRequest
     listener: Listener
+    done: int
     total: int
     held: list[Row] = field(default_factory=list)
     finished: queue.SimpleQueue[tuple[Task, Future]] = field(default_factory=queue.SimpleQueue)
@@ -173,8 +176,9 @@ class _Shift:
     def _write(self) -> None:
         if self.held:
             self.store.add(self.held)
+            self.done += len(self.held)
             self.held = []
-            self.listener(self.total - self.finished.qsize(), self.total)
+            self.listener(self.done, self.total)
 
     def _stopped(self, out: int) -> str:
         return (

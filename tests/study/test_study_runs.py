@@ -132,8 +132,16 @@ monte_carlo:
     noise: {corner_px: {uniform: [0.02, 0.1]}}
 """
     home = tmp_path_factory.mktemp("finished")
-    path = write_study(home, content)
-    return path, home / "out", run_study(read_study(path), home / "out", scheduler=scheduler)
+    path, told = write_study(home, content), []
+    outcome = run_study(
+        read_study(path),
+        home / "out",
+        scheduler=scheduler,
+        listener=lambda done, total: told.append((done, total)),
+    )
+    assert told == sorted(told)
+    assert (told[0], told[-1]) == ((0, 4), (4, 4))
+    return path, home / "out", outcome
 
 
 Finished = tuple[Path, Path, Outcome]
