@@ -61,7 +61,7 @@ def look_for_leftover(search: Search) -> Leftover:
             break
         if not _carry(search, cell, views):
             break
-    search.drop_waves({cell.site for cell in found if cell.site == cell.covariate})
+    search.drop_on_joints({cell.site for cell in found if cell.site == cell.covariate})
     return Leftover(search, tuple(found))
 
 

@@ -41,6 +41,8 @@ _EXCHANGED_AGAINST = 3
 _SCORE_FALLS_SHORT = 5.0
 """A fit in earnest has gained up to about this many times what its score test promised."""
 
+_FOLLOW_THE_ANGLE = ("joint_periodic_error", "joint_compliance")
+
 _BESIDE_SHARE = 0.05
 """Beside a field of shifts a name must gain at least this share of what the field gains."""
 
@@ -246,19 +248,27 @@ class Search:
                 self._settle(without)
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
 
-    def drop_waves(self, joints: set[str]) -> None:
-        """Drop the periodic error of joints that follow their own angle by a curve without a name.
+    def drop_on_joints(self, joints: set[str]) -> None:
+        """Hold what is told of joints that follow their own angle by a curve without a name.
 
-        A kink is soaked up by a wave and a remainder: where there is a remainder, it was no wave.
+        A kink is soaked up by a wave or a sag and a remainder: where there is a remainder, it was
+        neither. A wave loses its name for it, and so does a sag that is left without an amount.
         """
         for present in self.best.fit.model.effects:
-            if present.effect.name != "joint_periodic_error":
+            if present.effect.name not in _FOLLOW_THE_ANGLE:
                 continue
-            names = (present.effect.parameters[k].name for k in present.free)
-            if joints & {f"joint_{name.rsplit('_', 1)[1]}" for name in names}:
-                rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
-                self._settle(self.fitter.with_effects(self.best.fit, rest))
+            names = {k: present.effect.parameters[k].name for k in present.free}
+            held = {k for k, name in names.items() if f"joint_{name.rsplit('_', 1)[1]}" in joints}
+            if not held:
+                continue
+            rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
+            if present.effect.name == "joint_compliance" and len(held) < len(names):
+                values = present.values.copy()
+                values[list(held)] = 0.0
+                rest = (*rest, replace(present, values=values, held=present.held | held))
+            else:
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
+            self._settle(self.fitter.with_effects(self.best.fit, rest))
 
     def _drop(self) -> bool:
         """Drop the effect that the others have made needless, if there is one."""

@@ -77,7 +77,20 @@ def test_a_wave_loses_its_name_where_its_joint_needs_a_curve_besides():
     fitter = Fitter(record(plain_cell().with_effects([wave]), LOG, seed=64))
     search = Search(fitter.fit(plain_cell(), NOISE), fitter)
     search.force([wave])
-    search.drop_waves(set())
+    search.drop_on_joints(set())
     assert [p.effect.name for p in search.best.fit.model.effects] == ["joint_periodic_error"]
-    search.drop_waves({"joint_3"})
+    search.drop_on_joints({"joint_3"})
     assert search.best.fit.model.effects == ()
+
+
+def test_a_sag_keeps_its_name_for_the_joints_that_need_no_curve():
+    sag = make_effect("joint_compliance", {"rad_per_Nm_2": 3e-5, "rad_per_Nm_4": 1e-4})
+    fitter = Fitter(record(plain_cell().with_effects([sag]), LOG, seed=65))
+    search = Search(fitter.fit(plain_cell(), NOISE), fitter)
+    search.force([sag])
+    search.drop_on_joints({"joint_4"})
+    (left,) = search.best.fit.model.effects
+    assert left.effect.name == "joint_compliance"
+    values = left.as_mapping()
+    assert values["rad_per_Nm_4"] == 0.0
+    assert values["rad_per_Nm_2"] != 0.0
