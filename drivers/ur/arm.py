@@ -98,7 +98,7 @@ class URArm:
                 packet.vector("actual_TCP_pose"), packet.vector("tcp_offset")
             ),
             motion=_motion(supervisor, packet),
-            fault=supervisor.fault,
+            fault=supervisor.why(),
             raw=self._raw(packet),
         )
 
@@ -113,8 +113,9 @@ class URArm:
         )
         packet = self._reader.newest()
         supervisor = self._connected()
-        if supervisor.fault is not None:
-            raise ArmStopped(self._named(supervisor.fault))
+        fault = supervisor.why()
+        if fault is not None:
+            raise ArmStopped(self._named(fault))
         if supervisor.busy or not at_rest(packet):
             raise DeviceRefused(
                 self._named("still moving: wait until it is steady, or stop it first")

@@ -29,6 +29,7 @@ _CYCLE_S = 0.01
 _BEAT_S = 0.2
 _RESEND_S = 0.05
 _STOP_CONFIRM_S, _REPEAT_S = 1.0, 3.0
+_WHY_S = 0.1
 
 
 class Supervisor:
@@ -67,6 +68,8 @@ class Supervisor:
         self._stop_s: float | None = None
         self._resent_s = 0.0
         self.fault: str | None = None
+        self._told = False
+        self._tripped_s = 0.0
         self.stop_failed: str | None = None
         self._thread = threading.Thread(target=self._run, name="ur-supervisor", daemon=True)
         self._thread.start()
@@ -103,6 +106,13 @@ class Supervisor:
         """Forget a fault that the operator has mended."""
         with self._lock:
             self.fault = self.stop_failed = None
+            self._told = False
+
+    def why(self) -> str | None:
+        """The fault in its own words: of a stop just ordered, a packet soon tells the cause."""
+        while self.fault and not self._told and time.monotonic() - self._tripped_s < _WHY_S:
+            time.sleep(_CYCLE_S)
+        return self.fault
 
     def close(self) -> None:
         """Stop the arm and end the thread."""
@@ -151,13 +161,14 @@ class Supervisor:
         if fault is not None:
             self._trip(fault)
         # the child may notice before the packet comes that tells why
-        self.fault = told or self.fault
+        self.fault, self._told = told or self.fault, self._told or told is not None
         self._see_stop_through(packet)
         if self.fault is None and self._stop_s is None:
             self._drive(packet)
 
     def _trip(self, fault: str) -> None:
         if self.fault is None:
+            self._tripped_s = time.monotonic()
             self.fault = fault
             self.stop()
 

@@ -27,7 +27,15 @@ def _rich_cell(mount: Mount) -> tuple[CellModel, Views]:
     model, views = cell(mount, frames=2)
     effects = [
         make_effect("joint_zero_offset", {f"offset_rad_{j}": 1e-3 * j for j in JOINTS}),
-        make_effect("mount_flex", {"rad_per_g": 2e-3}),
+        make_effect(
+            "mount_flex",
+            {
+                "rad_per_g": 2e-3,
+                "rad_per_g_lever_x": 1e-3,
+                "rad_per_g_lever_y": -5e-4,
+                "rad_per_g_turn": 7e-4,
+            },
+        ),
         make_effect("board_warp", {"bend_x_m": 1e-3, "bend_y_m": -5e-4, "twist_m": 7e-4}),
         make_effect("focus_breathing", {"law": "thin_lens", "f_m": 0.016}),
         make_effect("decentering", {"p1": 1e-3, "p2": -2e-3}),
@@ -47,14 +55,15 @@ def _pixels(x: object, flange_error: object, model: CellModel, views: Views, i: 
     mounted = anp.dot(model.flange_from_mounted, independent.rigid(x[at : at + 6]))
     fixed = anp.dot(model.base_from_fixed, independent.rigid(x[at + 6 : at + 12]))
     values = anp.concatenate([p.values[_free(p)] for p in model.effects]) + x[at + 12 :]
-    offset, flex, warp, thin, centre, sag, tilt = _split(values, [4, 1, 3, 1, 2, 1, 2])
+    offset, flex, warp, thin, centre, sag, tilt = _split(values, [4, 4, 3, 1, 2, 1, 2])
     joints, dh = views.joints_rad[i], arm(ARM).dh
     moved_joints = anp.concatenate([joints[:1], joints[1:5] + offset, joints[5:]])
     back = np.linalg.inv(independent.flange(joints, dh))
     flange = anp.dot(views.base_from_flange[i], anp.dot(back, independent.flange(moved_joints, dh)))
     flange = anp.dot(flange, independent.rigid(flange_error))
     down = anp.dot(flange[:3, :3].T, anp.array([0.0, 0.0, -1.0]))
-    bend = flex[0] * anp.array([-down[1], down[0], 0.0])
+    lever = independent.cross_matrix([flex[1], flex[2], flex[0]])
+    bend = anp.dot(lever, down) + flex[3] * down
     mounted = anp.dot(independent.rigid(anp.concatenate([anp.zeros(3), bend])), mounted)
     rides = anp.dot(flange, mounted)
     camera, board = (rides, fixed) if views.mount == "eye_in_hand" else (fixed, rides)
