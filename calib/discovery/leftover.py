@@ -61,7 +61,8 @@ def look_for_leftover(search: Search) -> Leftover:
             break
         if not _carry(search, cell, views):
             break
-    search.drop_on_joints({cell.site for cell in found if cell.site == cell.covariate})
+    search.drop_on_joints({cell.site for cell in found})
+    search.drop_beside_curves()
     return Leftover(search, tuple(found))
 
 

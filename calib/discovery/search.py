@@ -44,7 +44,7 @@ _SCORE_FALLS_SHORT = 5.0
 _FOLLOW_THE_ANGLE = ("joint_periodic_error", "joint_compliance")
 
 _BESIDE_SHARE = 0.05
-"""Beside a field of shifts a name must gain at least this share of what the field gains."""
+"""Beside a field of shifts, or curves in its link, a name must gain this share of their gain."""
 
 
 @dataclass(frozen=True)
@@ -249,10 +249,11 @@ class Search:
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
 
     def drop_on_joints(self, joints: set[str]) -> None:
-        """Hold what is told of joints that follow their own angle by a curve without a name.
+        """Hold what is told of joints that follow anything by a curve without a name.
 
-        A kink is soaked up by a wave or a sag and a remainder: where there is a remainder, it was
-        neither. A wave loses its name for it, and so does a sag that is left without an amount.
+        A kink, or a cable's drag, is soaked up by a wave or a sag and a remainder: where there is
+        a remainder, it was neither. A wave loses its name for it, and so does a sag that is left
+        without an amount.
         """
         for present in self.best.fit.model.effects:
             if present.effect.name not in _FOLLOW_THE_ANGLE:
@@ -269,6 +270,31 @@ class Search:
             else:
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
             self._settle(self.fitter.with_effects(self.best.fit, rest))
+
+    def drop_beside_curves(self) -> None:
+        """Drop what gains but a trifle of what the unnamed curves in the same link gain.
+
+        A curve of few knots leaves something of what it carries: no name rests on that.
+        """
+        effects = self.best.fit.model.effects
+        curves = [p for p in effects if p.effect.name == "empirical"]
+        worth = {curve.effect.label: self._missed(curve)[0] for curve in curves}
+        for present in effects:
+            beside = sum(
+                worth[c.effect.label] for c in curves if c.effect.link == present.effect.link
+            )
+            if present.effect.name == "empirical" or beside == 0.0:
+                continue
+            missed, without = self._missed(present)
+            if missed < _BESIDE_SHARE * beside:
+                self._settle(without)
+                self.steps = [s for s in self.steps if s.taken.effect != present.effect]
+
+    def _missed(self, present: Present) -> tuple[float, JointFit]:
+        """By how much the criterion rises without an effect, and the fit without it."""
+        rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
+        without = self.fitter.with_effects(self.best.fit, rest)
+        return self._trial(without).criterion - self.best.criterion, without
 
     def _drop(self) -> bool:
         """Drop the effect that the others have made needless, if there is one."""

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from calib.chain.effects import make_effect
-from calib.chain.model import kinematics_of
+from calib.chain.empirical import Curve, covariate_named, present_curve, site_named
+from calib.chain.model import kinematics_of, walk
 from calib.discovery.bookkeeping.branches import Branches, choose_branches
 from calib.discovery.books import keep_books
 from calib.discovery.fields import field_scores
@@ -94,3 +95,30 @@ def test_a_sag_keeps_its_name_for_the_joints_that_need_no_curve():
     values = left.as_mapping()
     assert values["rad_per_Nm_4"] == 0.0
     assert values["rad_per_Nm_2"] != 0.0
+
+
+def beside_a_drag_of_the_wrist(sag_rad_per_Nm: float, decentering: float) -> list[str]:
+    """Names left where the fifth joint follows the sixth: a curve carries the drag."""
+    true = [
+        make_effect("joint_compliance", {"rad_per_Nm_2": sag_rad_per_Nm}),
+        make_effect("decentering", {"p1": decentering}),
+    ]
+    low, high = LOG.joints_rad[:, 5].min(), LOG.joints_rad[:, 5].max()
+    curve = Curve(site_named("joint_5"), covariate_named("joint_6"), low, high)
+    empty = present_curve(curve, walk(plain_cell(), LOG))
+    bent = replace(empty, values=1e-3 * np.sin(np.arange(len(empty.values))))
+    fitter = Fitter(record(plain_cell().with_effects([bent, *true]), LOG, seed=66))
+    search = Search(fitter.fit(plain_cell(), NOISE), fitter)
+    assert search.put_in(empty)
+    search.force([*search.best.fit.model.effects, *true])
+    search.drop_beside_curves()
+    return [p.effect.name for p in search.best.fit.model.effects]
+
+
+def test_beside_a_curve_a_name_of_its_link_must_gain_a_share_of_what_the_curve_does():
+    assert beside_a_drag_of_the_wrist(1e-6, 1e-3) == ["empirical", "decentering"]
+    assert beside_a_drag_of_the_wrist(1e-4, 1e-5) == [
+        "empirical",
+        "joint_compliance",
+        "decentering",
+    ]
