@@ -41,7 +41,7 @@ _EXCHANGED_AGAINST = 3
 _SCORE_FALLS_SHORT = 5.0
 """A fit in earnest has gained up to about this many times what its score test promised."""
 
-_FOLLOW_THE_ANGLE = ("joint_periodic_error", "joint_compliance")
+_LIKE_A_CURVE = ("joint_periodic_error", "joint_compliance", "joint_backlash")
 
 _BESIDE_SHARE = 0.05
 """Beside a field of shifts, or curves in its link, a name must gain this share of their gain."""
@@ -251,19 +251,19 @@ class Search:
     def drop_on_joints(self, joints: set[str]) -> None:
         """Hold what is told of joints that follow anything by a curve without a name.
 
-        A kink, or a cable's drag, is soaked up by a wave or a sag and a remainder: where there is
-        a remainder, it was neither. A wave loses its name for it, and so does a sag that is left
-        without an amount.
+        A kink, or a cable's drag, is soaked up by a wave, a sag or a play, and a remainder: where
+        there is a remainder, it was none of them. A wave loses its name for it, and so does a sag
+        or a play that is left without an amount.
         """
         for present in self.best.fit.model.effects:
-            if present.effect.name not in _FOLLOW_THE_ANGLE:
+            if present.effect.name not in _LIKE_A_CURVE:
                 continue
             names = {k: present.effect.parameters[k].name for k in present.free}
             held = {k for k, name in names.items() if f"joint_{name.rsplit('_', 1)[1]}" in joints}
             if not held:
                 continue
             rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
-            if present.effect.name == "joint_compliance" and len(held) < len(names):
+            if present.effect.name != "joint_periodic_error" and len(held) < len(names):
                 values = present.values.copy()
                 values[list(held)] = 0.0
                 rest = (*rest, replace(present, values=values, held=present.held | held))

@@ -84,6 +84,17 @@ def test_a_wave_loses_its_name_where_its_joint_needs_a_curve_besides():
     assert search.best.fit.model.effects == ()
 
 
+def test_play_loses_its_name_where_its_joint_needs_a_curve_besides():
+    play = make_effect("joint_backlash", {"play_rad_3": 3e-4})
+    fitter = Fitter(record(plain_cell().with_effects([play]), LOG, seed=67))
+    search = Search(fitter.fit(plain_cell(), NOISE), fitter)
+    search.force([replace(play, held=frozenset(range(6)) - {2})])
+    search.drop_on_joints({"joint_2"})
+    assert [p.effect.name for p in search.best.fit.model.effects] == ["joint_backlash"]
+    search.drop_on_joints({"joint_3"})
+    assert search.best.fit.model.effects == ()
+
+
 def test_a_sag_keeps_its_name_for_the_joints_that_need_no_curve():
     sag = make_effect("joint_compliance", {"rad_per_Nm_2": 3e-5, "rad_per_Nm_4": 1e-4})
     fitter = Fitter(record(plain_cell().with_effects([sag]), LOG, seed=65))
