@@ -208,9 +208,11 @@ def test_faults_at_random_instants_leave_the_arm_standing_and_are_told(seed):
 
 
 _MOVE_AND_WAIT = """
-import sys, time
+import signal, sys, time
 from drivers.arm import MoveTarget
 from drivers.ur import URArm, URSettings
+# what a shell starts in the background inherits a deaf ear for Ctrl-C
+signal.signal(signal.SIGINT, signal.default_int_handler)
 arm = URArm(sys.argv[1], URSettings(heartbeat_s=0.5))
 arm.connect()
 arm.start_move(MoveTarget(joints_rad=tuple(map(float, sys.argv[2:])), joint_speed_rad_s=0.2,
