@@ -4,26 +4,22 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import ConfigDict, Field, PositiveFloat
+
+from cell.files.result_part import ResultPart
 
 Vector = tuple[float, float, float]
 Sigma = Annotated[float, Field(ge=0)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False
-    )
-
-
-class RejectedFrame(_Part):
+class RejectedFrame(ResultPart):
     """A frame left out."""
 
     frame: int
     reason: str
 
 
-class ScaleFactorPart(_Part):
+class ScaleFactorPart(ResultPart):
     """Scale factors of one view nearly parallel to the board (the paper's Eqs. 14, 15)."""
 
     frame: int
@@ -37,7 +33,7 @@ class ScaleFactorPart(_Part):
     tilt_rad: float
 
 
-class ZonesPart(_Part):
+class ZonesPart(ResultPart):
     """Where the focal length stands still (zone 2)."""
 
     near_limit_m: PositiveFloat
@@ -55,7 +51,7 @@ class ZonesPart(_Part):
     why: str
 
 
-class ParameterPart(_Part):
+class ParameterPart(ResultPart):
     """A fitted number."""
 
     value: float
@@ -63,7 +59,7 @@ class ParameterPart(_Part):
     unit: str
 
 
-class CandidateLaw(_Part):
+class CandidateLaw(ResultPart):
     """A law that was fitted; of AICc and BIC only differences mean something."""
 
     law: str
@@ -74,7 +70,7 @@ class CandidateLaw(_Part):
     parameters: dict[str, ParameterPart]
 
 
-class FocusLawPart(_Part):
+class FocusLawPart(ResultPart):
     """How alpha moves with distance."""
 
     law: str
@@ -86,7 +82,7 @@ class FocusLawPart(_Part):
     candidates: tuple[CandidateLaw, ...]
 
 
-class Reprojection(_Part):
+class Reprojection(ResultPart):
     """Residuals, detected minus predicted: signed statistics of the components, rms per corner."""
 
     mean: float
@@ -95,7 +91,7 @@ class Reprojection(_Part):
     rms: Sigma
 
 
-class PositionStatistics(_Part):
+class PositionStatistics(ResultPart):
     """Computed camera in the true camera's frame, metres; z forward, positive is too close."""
 
     mean: Vector
@@ -113,21 +109,21 @@ class PositionErrorPart(PositionStatistics):
     is small by construction."""
 
 
-class Consistency(_Part):
+class Consistency(ResultPart):
     """How far this solution's poses and the robot's disagree after hand-eye on them."""
 
     rms_m: Sigma
     rms_rad: Sigma
 
 
-class FocusPart(_Part):
+class FocusPart(ResultPart):
     """How alpha and beta follow the distance by this solution's own fit."""
 
     law: Literal["inverse_square", "thin_lens"]
     parameters: dict[str, ParameterPart]
 
 
-class CovariancePart(_Part):
+class CovariancePart(ResultPart):
     """Covariance of the numbers fitted together, in the units their names tell.
 
     Transforms are freed by increments (x, y, z, rx, ry, rz) in their second-named frame. Where
@@ -138,7 +134,7 @@ class CovariancePart(_Part):
     matrix: tuple[tuple[float, ...], ...]
 
 
-class SolutionPart(_Part):
+class SolutionPart(ResultPart):
     """One camera model."""
 
     alpha_px: PositiveFloat
@@ -171,7 +167,7 @@ class SolutionPart(_Part):
     robot_consistency: Consistency | None
 
 
-class TransformPart(_Part):
+class TransformPart(ResultPart):
     """A rigid transform; the sigmas are of increments in the second-named frame."""
 
     p_m: Vector
@@ -180,7 +176,7 @@ class TransformPart(_Part):
     sigma_r_rad: Vector
 
 
-class RobotPart(_Part):
+class RobotPart(ResultPart):
     """What the joint fit said of robot and noise."""
 
     mount: Literal["eye_in_hand", "eye_to_hand"]
@@ -194,7 +190,7 @@ class RobotPart(_Part):
     """Frames whose logged pose disagrees with their picture."""
 
 
-class NotSeparable(_Part):
+class NotSeparable(ResultPart):
     """Quantities that the views see nearly only together."""
 
     quantities: tuple[str, ...]
@@ -206,7 +202,7 @@ class NotSeparable(_Part):
     """By what factor four such views lower the combination's uncertainty."""
 
 
-class UncertaintyPart(_Part):
+class UncertaintyPart(ResultPart):
     """One sigma of the joint fit's camera where it is used: D distances, G places in the image.
 
     From the full covariance of lens, focus law and the camera's place on the robot; a next
@@ -225,7 +221,7 @@ class UncertaintyPart(_Part):
     """(D, G, 3) right, down, away: of where the robot is told a part is, from one picture."""
 
 
-class CornersLeftOut(_Part):
+class CornersLeftOut(ResultPart):
     """Corners of a used frame that lie too far off to be detections of the board."""
 
     frame: int
@@ -233,7 +229,7 @@ class CornersLeftOut(_Part):
     """Counted row by row from the board's first corner."""
 
 
-class CalibrationFile(_Part):
+class CalibrationFile(ResultPart):
     """The whole of `calibration.json`; metres, radians, pixels."""
 
     model_config = ConfigDict(

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from cell.files.result_part import ResultPart
 
 SCHEMA: Final = "cell.diagnosis/1"
 Probability = Annotated[float, Field(ge=0, le=1)]
 NotNegative = Annotated[float, Field(ge=0)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False
-    )
-
-
-class RejectedPart(_Part):
+class RejectedPart(ResultPart):
     """A frame left out."""
 
     frame: int
     reason: str
 
 
-class ValuePart(_Part):
+class ValuePart(ResultPart):
     """A number with its one-sigma uncertainty; zero sigma: given or exact."""
 
     value: float
@@ -32,7 +28,7 @@ class ValuePart(_Part):
     unit: str
 
 
-class HoldoutPart(_Part):
+class HoldoutPart(ResultPart):
     """Whole frames that no fit has seen, predicted from the robot's log alone."""
 
     frames: list[int]
@@ -47,7 +43,7 @@ class HoldoutPart(_Part):
     """Negative log likelihood per frame."""
 
 
-class SplitPart(_Part):
+class SplitPart(ResultPart):
     """Squared misfit in units of the noise, per degree of freedom: one where only noise is left."""
 
     pose: NotNegative
@@ -56,14 +52,14 @@ class SplitPart(_Part):
     """Of what it could not: seen in the pictures alone."""
 
 
-class MisfitPart(_Part):
+class MisfitPart(ResultPart):
     """The misfit of the plain model and of the final one, judged by the final noise."""
 
     before: SplitPart
     after: SplitPart
 
 
-class MismatchPart(_Part):
+class MismatchPart(ResultPart):
     """Where the misfit of the plain model lives."""
 
     link: str
@@ -76,7 +72,7 @@ class MismatchPart(_Part):
     p_value: Probability
 
 
-class EffectPart(_Part):
+class EffectPart(ResultPart):
     """Named physics, or a slip of the log."""
 
     name: str
@@ -90,7 +86,7 @@ class EffectPart(_Part):
     """How much worse the held-out frames are predicted without it; null for a slip."""
 
 
-class AmbiguityPart(_Part):
+class AmbiguityPart(ResultPart):
     """Names that these data cannot tell apart."""
 
     names: list[str]
@@ -101,7 +97,7 @@ class AmbiguityPart(_Part):
     """A plan file that would, beside this file; null where no poses can."""
 
 
-class UnexplainedPart(_Part):
+class UnexplainedPart(ResultPart):
     """Something real without a name: where it lives."""
 
     link: str
@@ -111,7 +107,7 @@ class UnexplainedPart(_Part):
     p_value: Probability
 
 
-class NoisePart(_Part):
+class NoisePart(ResultPart):
     """One-sigma levels, estimated from the recording."""
 
     corner_px: NotNegative
@@ -120,7 +116,7 @@ class NoisePart(_Part):
     print_m: NotNegative
 
 
-class DiagnosisFile(_Part):
+class DiagnosisFile(ResultPart):
     """The whole of diagnosis.json."""
 
     schema_: Literal["cell.diagnosis/1"] = Field(default=SCHEMA, alias="schema")

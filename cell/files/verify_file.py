@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import ConfigDict, Field, PositiveFloat
+
+from cell.files.result_part import ResultPart
 
 SCHEMA: Final = "cell.verify/1"
 Probability = Annotated[float, Field(ge=0, le=1)]
@@ -12,20 +14,14 @@ NotNegative = Annotated[float, Field(ge=0)]
 Vector = tuple[float, float, float]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False
-    )
-
-
-class LeftOutPart(_Part):
+class LeftOutPart(ResultPart):
     """A frame left out."""
 
     frame: int
     reason: str
 
 
-class MountPart(_Part):
+class MountPart(ResultPart):
     """By how much the camera moved on its mount: an increment in the camera's own frame."""
 
     shift_m: Vector
@@ -35,7 +31,7 @@ class MountPart(_Part):
     sigma_turn_rad: Vector
 
 
-class AlphaPart(_Part):
+class AlphaPart(ResultPart):
     """By how much the focal length changed at a distance."""
 
     distance_m: PositiveFloat
@@ -45,7 +41,7 @@ class AlphaPart(_Part):
     sigma_px: NotNegative
 
 
-class BoardPart(_Part):
+class BoardPart(ResultPart):
     """Where the board is against where it was calibrated; moving it is no fault of the camera."""
 
     moved: bool
@@ -54,7 +50,7 @@ class BoardPart(_Part):
     turn_rad: NotNegative
 
 
-class NoisePart(_Part):
+class NoisePart(ResultPart):
     """What these frames measured of noise, and what the old calibration had."""
 
     corner_px: PositiveFloat
@@ -65,7 +61,7 @@ class NoisePart(_Part):
     """Of a scatter as large by chance."""
 
 
-class FramePart(_Part):
+class FramePart(ResultPart):
     """One frame: the board where it fits all frames best, everything else as calibrated."""
 
     frame: int
@@ -78,7 +74,7 @@ class FramePart(_Part):
     """By which the robot would miss a part of the board's size that this picture locates."""
 
 
-class DistancePart(_Part):
+class DistancePart(ResultPart):
     """The misfit over a range of distances."""
 
     near_m: PositiveFloat
@@ -91,7 +87,7 @@ class DistancePart(_Part):
     lateral_m: NotNegative
 
 
-class ImagePart(_Part):
+class ImagePart(ResultPart):
     """The misfit in a part of the image."""
 
     from_px: tuple[float, float]
@@ -104,7 +100,7 @@ class ImagePart(_Part):
     lateral_m: NotNegative
 
 
-class NoticeablePart(_Part):
+class NoticeablePart(ResultPart):
     """The smallest changes these views would have shown nine times in ten."""
 
     shift_m: NotNegative
@@ -115,7 +111,7 @@ class NoticeablePart(_Part):
     """Above it the check cannot tell."""
 
 
-class LengthPart(_Part):
+class LengthPart(ResultPart):
     """A known length measured with the old calibration: the error of length measurement."""
 
     known_m: PositiveFloat
@@ -142,7 +138,7 @@ Verdict = Literal[
 ]
 
 
-class VerifyFile(_Part):
+class VerifyFile(ResultPart):
     """The whole of `verify.json`; metres, radians, pixels."""
 
     model_config = ConfigDict(
