@@ -1,14 +1,16 @@
 """CPU time and memory of the solver beside OpenCV's and mrcal's, on the same data.
 
-    python benchmarks/solver_speed.py [REPEATS]
+    python -m benchmarks.solver_speed [REPEATS]
 
 Camera 4096 x 3072, alpha 4750 px, k1 k2 p1 p2, 14 x 14 corners, noise 0.1 px, 0.35 to 1 m, tilts 0
 to 45 degrees. CPU seconds are user and system time of all threads, the least of the repeats, after
 one small fit that loads what is compiled. Ours and OpenCV find their own start; mrcal is given
 ours, whose time is told by itself.
 mrcal is asked in `.mrcal` (see `tools/install-mrcal`) and left out where it is missing.
-Every fit runs in a process of its own. Memory is that process's greatest resident set, and what it
-held before it had any data; ours and OpenCV's load the same modules.
+Every fit runs in a process of its own, which loads no more than its work needs. Memory is that
+process's greatest resident set, what it held before it had any data, and how much of it were pages
+of library files, which all processes share and of which the kernel maps more or fewer at a time as
+they lie in its cache.
 """
 
 from __future__ import annotations
@@ -20,25 +22,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from calib.chain import rigid
-from calib.chain.effects import make_effect
-from calib.chain.kinematics import arm
-from calib.chain.model import CellModel
 from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
 from calib.paper.homography import robust_homography
 from calib.paper.zhang import zhang_pinhole
 from calib.solver.free_poses import fit_free_poses
-from calib.solver.joint import assemble
-from calib.solver.unknowns import amounts, dependence, prior_information, unknowns_of
-from calib.views import Board, FloatArray, Views
+from calib.views import Board, FloatArray
 
 BOARD = Board("chessboard", rows=14, cols=14, square_m=0.0125)
 WIDTH, HEIGHT = 4096, 3072
@@ -57,26 +52,6 @@ TRUE = optics_row(
 FIT_GOAL_S = {200: 0.06, 1000: 0.32}
 JOINT_GOAL_S = 0.14
 MRCAL = Path(__file__).parents[1] / ".mrcal" / "bin" / "python"
-MIDDLE_RAD = np.array([0.3, -1.5, 1.6, -1.7, -1.5, 0.4])
-EFFECTS: dict[str, dict[str, float | str]] = {
-    "link_geometry": {},
-    "joint_zero_offset": {},
-    "joint_compliance": {},
-    "board_warp": {},
-    "board_scale": {},
-    "board_shear": {},
-    "focus_breathing": {"law": "thin_lens"},
-    "focus_hysteresis": {},
-    "entrance_pupil_shift": {},
-    "protective_window": {},
-    "distance_dependent_distortion": {},
-    "decentering": {},
-    "higher_order_radial": {},
-    "sensor_tilt": {},
-    "lens_sag": {},
-    "mount_flex": {},
-    "pose_time_lag": {},
-}
 
 
 def observed(frames: int) -> tuple[FloatArray, FloatArray]:
@@ -124,53 +99,11 @@ def opencv(corners: FloatArray) -> FloatArray:
     return np.array([A[0, 0], A[1, 1], A[0, 2], A[1, 2], *np.ravel(k)[:4]])
 
 
-def joint_cell(frames: int) -> tuple[CellModel, Views]:
-    """A cell with 36 numbers of effects beside the plain 18, and what it recorded."""
-    rng = np.random.default_rng(2)
-    kinematics = arm("ur5e")
-    joints = MIDDLE_RAD + rng.uniform(-0.12, 0.12, (frames, 6))
-    ahead = rigid.compose(np.array([0.3, 0.2, 0.1]), np.array([-0.08, -0.08, 0.55]))
-    mounted = rigid.compose(np.array([0.02, -0.03, 0.7]), np.array([0.03, -0.04, 0.09]))
-    fixed = kinematics.forward(MIDDLE_RAD) @ mounted @ ahead
-    effects = [make_effect(name, given) for name, given in EFFECTS.items()]
-    model = CellModel(TRUE, mounted, fixed, tuple(effects))
-    blank = Views.blank(BOARD, width_px=WIDTH, height_px=HEIGHT, frames=frames)
-    flange = kinematics.forward(joints)
-    seen = project(
-        np.repeat(TRUE[None], frames, axis=0),
-        rigid.inverse(flange @ mounted) @ fixed,
-        BOARD.corners_m,
-    )
-    views = replace(
-        blank,
-        corners_px=seen,
-        base_from_flange=flange,
-        joints_rad=joints,
-        approach_joints_rad=joints + rng.uniform(-0.1, 0.1, joints.shape),
-        joint_velocity_rad_s=rng.uniform(-0.5, 0.5, joints.shape),
-        t_s=np.arange(frames, dtype=float),
-        robot_model="ur5e",
-        moving=True,
-    )
-    return model, views
-
-
-def normal_equations(model: CellModel, views: Views) -> FloatArray:
-    """Linearise the chain and go once over all corners."""
-    unknowns = unknowns_of(model, (*FREE[:6],))
-    error = np.zeros((len(views), 6))
-    found = dependence(model, views, unknowns, kinematics=arm("ur5e"), flange_error=error)
-    prior = (amounts(model, unknowns), prior_information(unknowns))
-    weight = np.ones(views.corners_px.shape[:2])
-    equations, _ = assemble(found, views, weight, error, None, prior)
-    return equations.frames.shared
-
-
-def peak_mb() -> float:
-    """Greatest resident set of this process so far."""
+def memory_mb(what: str) -> float:
+    """What the kernel tells of this process's memory: `VmHWM` is the greatest resident set."""
     # getrusage would count what the parent held when it forked
     status = Path("/proc/self/status").read_text(encoding="ascii")
-    return int(status.split("VmHWM:")[1].split()[0]) / 1024
+    return int(status.split(f"{what}:")[1].split()[0]) / 1024
 
 
 def measured(work: Callable[[], FloatArray], repeats: int, before_mb: float) -> dict[str, Any]:
@@ -183,7 +116,8 @@ def measured(work: Callable[[], FloatArray], repeats: int, before_mb: float) -> 
     return {
         "seconds": min(times),
         "before_mb": before_mb,
-        "peak_mb": peak_mb(),
+        "peak_mb": memory_mb("VmHWM"),
+        "files_mb": memory_mb("RssFile"),
         "result": result.tolist(),
     }
 
@@ -191,18 +125,20 @@ def measured(work: Callable[[], FloatArray], repeats: int, before_mb: float) -> 
 def child(what: str, frames: int, repeats: int) -> dict[str, Any]:
     """What one process measures."""
     if what == "joint":
+        from benchmarks.solver_speed_joint import joint_cell, normal_equations
+
         normal_equations(*joint_cell(5))
-        before_mb = peak_mb()
+        before_mb = memory_mb("VmHWM")
         cell = joint_cell(frames)
         return measured(lambda: normal_equations(*cell), repeats, before_mb)
     few = observed(10)[0]
     if what == "opencv":
         opencv(few)
-        before_mb = peak_mb()
+        before_mb = memory_mb("VmHWM")
         corners = observed(frames)[0]
         return measured(lambda: opencv(corners), repeats, before_mb)
     fitted(few, *start(few))
-    before_mb = peak_mb()
+    before_mb = memory_mb("VmHWM")
     corners = observed(frames)[0]
     if what == "start":
         return measured(lambda: start(corners)[0], repeats, before_mb)
@@ -246,10 +182,10 @@ def main() -> None:
         print(json.dumps(child(sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))))
         return
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 5
-    me = [sys.executable, __file__, "--child"]
+    me = [sys.executable, "-m", "benchmarks.solver_speed", "--child"]
     print(f"load average {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
-    print("| work | solver | CPU s | goal | peak (before data) MB | off ours, px |")
-    print("|---|---|---|---|---|---|")
+    print("| work | solver | CPU s | goal | peak MB | before data | of files | off ours, px |")
+    print("|---|---|---|---|---|---|---|---|")
     for frames, goal in FIT_GOAL_S.items():
         found = {
             who: answer([*me, who, str(frames), str(repeats)])
@@ -290,7 +226,7 @@ def line(
     if one is None:
         return
     told = f"{goal}" if goal is not None and who.startswith("ours") else ""
-    memory = f"{one['peak_mb']:.0f} ({one['before_mb']:.0f})"
+    memory = f"{one['peak_mb']:.0f} | {one['before_mb']:.0f} | {one['files_mb']:.0f}"
     print(f"| {work} | {who} | {one['seconds']:.3f} | {told} | {memory} | {gap} |", flush=True)
 
 

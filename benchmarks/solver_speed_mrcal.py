@@ -38,19 +38,24 @@ def solve(data):
     return intrinsics[0]
 
 
-def peak_mb():
-    """Greatest resident set so far."""
+def memory_mb(what):
+    """What the kernel tells of this process's memory."""
     # getrusage would count what the parent held when it forked
     status = Path("/proc/self/status").read_text(encoding="ascii")
-    return int(status.split("VmHWM:")[1].split()[0]) / 1024
+    return int(status.split(f"{what}:")[1].split()[0]) / 1024
 
 
-before_mb = peak_mb()
+before_mb = memory_mb("VmHWM")
 data = dict(np.load(sys.argv[1]))
 times = []
 for _ in range(int(sys.argv[2])):
     began = time.process_time()
     result = solve(data)
     times.append(time.process_time() - began)
-told = {"seconds": min(times), "before_mb": before_mb, "peak_mb": peak_mb()}
+told = {
+    "seconds": min(times),
+    "before_mb": before_mb,
+    "peak_mb": memory_mb("VmHWM"),
+    "files_mb": memory_mb("RssFile"),
+}
 print(json.dumps({**told, "result": result.tolist()}))

@@ -8,6 +8,7 @@ nothing else.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,6 +40,18 @@ class FrameEquations:
     shared: FloatArray
     shared_residual: FloatArray
     square_sum: float
+
+
+def gathered(parts: Sequence[FrameEquations]) -> FrameEquations:
+    """The equations of all frames from those of consecutive blocks of them."""
+    return FrameEquations(
+        own=np.concatenate([part.own for part in parts]),
+        own_shared=np.concatenate([part.own_shared for part in parts]),
+        own_residual=np.concatenate([part.own_residual for part in parts]),
+        shared=np.sum([part.shared for part in parts], axis=0),
+        shared_residual=np.sum([part.shared_residual for part in parts], axis=0),
+        square_sum=sum(part.square_sum for part in parts),
+    )
 
 
 @dataclass(frozen=True)

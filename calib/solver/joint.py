@@ -11,7 +11,7 @@ from calib.chain.kinematics import ArmKinematics
 from calib.chain.model import CellModel, kinematics_of, walk
 from calib.chain.projection import project
 from calib.solver.accumulate import LocalEquations, local_equations
-from calib.solver.elimination import FrameEquations, solve_scaled
+from calib.solver.elimination import FrameEquations, gathered, solve_scaled
 from calib.solver.noise import JointEquations, Noise, Profile, estimate_noise, profile, scaled
 from calib.solver.unknowns import (
     Dependence,
@@ -27,6 +27,8 @@ GOOD_SIGMA = 3.0
 """A corner within this many sigma of its place counts fully."""
 SETTLED = 0.02
 """Weights that change by less, and noise levels by less of themselves, move no estimate."""
+BLOCK_FRAMES = 64
+"""Frames whose products are at hand together: they stay in the cache, and memory stays small."""
 
 
 @dataclass(frozen=True)
@@ -82,18 +84,21 @@ class JointFit:
         return float(np.sqrt(self.covariance[at, at]))
 
 
-def _corner_blocks(
-    found: Dependence, local: LocalEquations, equations: FrameEquations
+def _with_corners(
+    local: LocalEquations,
+    flange: FloatArray,
+    mapping: FloatArray,
+    equations: FrameEquations,
+    a: int,
 ) -> FrameEquations:
     """Append each corner's own in-plane shift to the shared numbers."""
     assert local.cross is not None
     assert local.own is not None
-    a, flange = len(found.active), found.flange
     n, m = local.own.shape[:2]
     cross = local.cross.reshape(n, 2 * m, -1)
-    p = found.local.shape[2]
+    p = mapping.shape[2]
     own_corner = np.einsum("nqk,ncq->nkc", flange, cross[:, :, a : a + 6])
-    shared_corner = np.einsum("ncq,nqp->pc", cross[:, :, :-1], found.local, optimize=True)
+    shared_corner = np.einsum("ncq,nqp->pc", cross[:, :, :-1], mapping, optimize=True)
     shared = np.zeros((p + 2 * m, p + 2 * m))
     shared[:p, :p] = equations.shared
     shared[:p, p:] = shared_corner
@@ -113,6 +118,26 @@ def _corner_blocks(
     )
 
 
+def _in_shared_numbers(
+    local: LocalEquations, flange: FloatArray, mapping: FloatArray, a: int
+) -> FrameEquations:
+    """A block's equations in flange errors and shared numbers; `a` optics columns are active."""
+    gram = local.gram
+    to_pose = gram[:, a : a + 6]
+    flange_t = np.swapaxes(flange, 1, 2)
+    mapped = gram[:, :-1, :-1] @ mapping
+    p = mapping.shape[2]
+    frames = FrameEquations(
+        own=flange_t @ to_pose[:, :, a : a + 6] @ flange,
+        own_shared=flange_t @ mapped[:, a : a + 6],
+        own_residual=(flange_t @ to_pose[:, :, -1:])[:, :, 0],
+        shared=mapping.reshape(-1, p).T @ mapped.reshape(-1, p),
+        shared_residual=np.einsum("nqi,nq->i", mapping, gram[:, :-1, -1]),
+        square_sum=float(gram[:, -1, -1].sum()),
+    )
+    return frames if local.own is None else _with_corners(local, flange, mapping, frames, a)
+
+
 def assemble(
     found: Dependence,
     views: Views,
@@ -127,33 +152,25 @@ def assemble(
     variances of these.
     """
     state = found.state
-    local = local_equations(
-        state.optics,
-        state.camera_from_board,
-        state.points_m,
-        views.corners_px,
-        weight,
-        found.active,
-        found.modes,
-        corners=corner_shift is not None,
-    )
-    a = len(found.active)
-    gram, flange, mapping = local.gram, found.flange, found.local
-    to_pose = gram[:, a : a + 6]
-    flange_t = np.swapaxes(flange, 1, 2)
-    mapped = gram[:, :-1, :-1] @ mapping
-    frames = FrameEquations(
-        own=flange_t @ to_pose[:, :, a : a + 6] @ flange,
-        own_shared=flange_t @ mapped[:, a : a + 6],
-        own_residual=(flange_t @ to_pose[:, :, -1:])[:, :, 0],
-        shared=np.einsum("nqi,nqj->ij", mapping, mapped, optimize=True),
-        shared_residual=np.einsum("nqi,nq->i", mapping, gram[:, :-1, -1]),
-        square_sum=float(gram[:, -1, -1].sum()),
-    )
-    if corner_shift is not None:
-        frames = _corner_blocks(found, local, frames)
+    parts: list[FrameEquations] = []
+    residual = np.empty(views.corners_px.shape)
+    for first in range(0, len(views), BLOCK_FRAMES):
+        block = slice(first, first + BLOCK_FRAMES)
+        local = local_equations(
+            state.optics[block],
+            state.camera_from_board[block],
+            state.points_m,
+            views.corners_px[block],
+            weight[block],
+            found.active,
+            found.modes,
+            corners=corner_shift is not None,
+        )
+        residual[block] = local.residual_px
+        flange, mapping = found.flange[block], found.local[block]
+        parts.append(_in_shared_numbers(local, flange, mapping, len(found.active)))
     equations = JointEquations(
-        frames=frames,
+        frames=gathered(parts),
         flange_error=flange_error,
         corner_shift=np.zeros(0) if corner_shift is None else corner_shift,
         amount=prior[0],
@@ -161,7 +178,7 @@ def assemble(
         corner_numbers=0 if corner_shift is None else len(corner_shift),
         observations=2.0 * float(weight.sum()),
     )
-    return equations, local.residual_px
+    return equations, residual
 
 
 def _robust_weight(residual_px: FloatArray, sigma_px: float) -> FloatArray:
