@@ -9,12 +9,21 @@ from numpy.typing import NDArray
 
 from calib.detection.charuco import find_charuco
 from calib.detection.finder import find_chessboard
+from calib.detection.first_call import make_ready
 from calib.detection.orientation import orient, turned_order, turns_to_agree
 from calib.detection.result import Detection, Rejected
 from calib.detection.summary import as_detection, saturated_share
 from calib.views import Board
 
-__all__ = ["Detection", "Rejected", "detect", "orient", "turned_order", "turns_to_agree"]
+__all__ = [
+    "Detection",
+    "Rejected",
+    "detect",
+    "make_ready",
+    "orient",
+    "turned_order",
+    "turns_to_agree",
+]
 
 
 def detect(image: NDArray[Any], board: Board) -> Detection | Rejected:

@@ -120,7 +120,7 @@ def _four_crossings(ring: Any, middle: float, ray: Any) -> bool:
     return crossings == 4
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _rays(image: Any, xy: Any, radius: float, least_amplitude: float) -> tuple[Any, Any]:
     """The four edge directions at each place, and whether the circle has four sectors there."""
     K = xy.shape[0]

@@ -25,18 +25,18 @@ _FEWEST_MARKERS = 2
 _NEAREST_MARKER_CORNERS = 6
 
 
-def _layouts(board: Board) -> list[Any]:
+def layouts(board: Board) -> list[Any]:
     """OpenCV's description of the board, as drawn since version 4.6 and as before."""
     if board.marker_m is None or board.dictionary is None:
         return []
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
     size = (board.cols + 1, board.rows + 1)
-    layouts = []
+    both = []
     for legacy in (False, True):
         layout = cv2.aruco.CharucoBoard(size, board.square_m, board.marker_m, dictionary)
         layout.setLegacyPattern(legacy)
-        layouts.append(layout)
-    return layouts
+        both.append(layout)
+    return both
 
 
 def _eight_bit(image: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -69,14 +69,14 @@ def _expected_corners(
 
 def _by_markers(image: NDArray[np.float32], board: Board) -> FloatArray | Rejected:
     """(rows, cols, 2) where the markers say the corners are, seen or not."""
-    layouts = _layouts(board)
-    if not layouts:
+    drawn = layouts(board)
+    if not drawn:
         return Rejected("a ChArUco board needs the size of its markers and their dictionary")
-    detector = cv2.aruco.ArucoDetector(layouts[0].getDictionary())
+    detector = cv2.aruco.ArucoDetector(drawn[0].getDictionary())
     marker_corners, marker_ids, _ = detector.detectMarkers(_eight_bit(image))
     if marker_ids is None or len(marker_ids) < _FEWEST_MARKERS:
         return Rejected("fewer than two of the board's markers were read")
-    found = [_expected_corners(layout, marker_corners, marker_ids, board) for layout in layouts]
+    found = [_expected_corners(layout, marker_corners, marker_ids, board) for layout in drawn]
     fitting = [entry for entry in found if entry is not None]
     if not fitting:
         return Rejected("the markers read are not those of this board")

@@ -22,6 +22,7 @@ _FIRST_LEVEL_PIXELS = 0.4e6
 _SMALLEST_SIDE_PX = 100
 _MOST_PIECES = 3
 _PARTIAL = "partial view"
+_NOTHING = "no chessboard corners in the picture"
 # a fit at this scale tells the shading and the bend of the lines well enough
 _GOOD_ENOUGH_SCALE = 0.5
 
@@ -63,7 +64,7 @@ def _filled(image: FloatImage, grid: Grid) -> tuple[Fitted, int]:
 
 
 def _on_level(image: FloatImage, board: Board) -> tuple[Grid, Fitted] | Rejected:
-    reasons, most = [Rejected("no chessboard corners in the picture")], 0
+    reasons, most = [Rejected(_NOTHING)], 0
     for lattice in grow_lattices(find_candidates(image))[:_MOST_PIECES]:
         placed = place_board(lattice, board)
         if isinstance(placed, Rejected):
@@ -101,7 +102,7 @@ def find_chessboard(image: FloatImage, board: Board) -> tuple[Fitted, NDArray[np
     best: Rejected | None = None
     for found in _found(image, board):
         if isinstance(found, Rejected):
-            best = found if best is None or _PARTIAL in found.reason else best
+            best = _more_telling(best, found)
             continue
         scale, grid, coarse = found
         first = _enlarged(coarse.parameters, scale)
@@ -114,3 +115,10 @@ def find_chessboard(image: FloatImage, board: Board) -> tuple[Fitted, NDArray[np
             continue
         return fine, doubt
     return Rejected("the picture is too small") if best is None else best
+
+
+def _more_telling(before: Rejected | None, now: Rejected) -> Rejected:
+    """Of two scales' reasons the one that saw more of a board."""
+    if before is None or _PARTIAL in now.reason or before.reason == _NOTHING:
+        return now
+    return before

@@ -14,6 +14,8 @@ from calib.views import Board
 
 _FEWEST_SEEN = 0.6
 _MOST_PLACEMENTS = 4
+# a board's lines bend by a few percent of a square from corner to corner, chance's by about one
+_MOST_UNEVEN = 0.4
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,16 @@ def _has_full_line_outside(lattice: Lattice, rows: int, cols: int) -> bool:
     return min(full_rows, full_cols) > short or max(full_rows, full_cols) > long
 
 
+def _is_even(grid: Grid) -> bool:
+    """Whether corners that follow each other lie about in line and equally far apart."""
+    bends = []
+    for line in (grid.corners_px, np.moveaxis(grid.corners_px, 1, 0)):
+        step, second = line[2:] - line[:-2], line[2:] - 2 * line[1:-1] + line[:-2]
+        bend = 2 * np.linalg.norm(second, axis=-1) / np.linalg.norm(step, axis=-1)
+        bends.append(bend[np.isfinite(bend)])
+    return float(np.median(np.concatenate(bends))) < _MOST_UNEVEN
+
+
 def place_board(lattice: Lattice, board: Board) -> list[Grid] | Rejected:
     """The ways in which the board may lie on the lattice, the fullest first.
 
@@ -104,7 +116,8 @@ def place_board(lattice: Lattice, board: Board) -> list[Grid] | Rejected:
     if not found:
         return Rejected(f"only {len(lattice)} of {board.corner_count} corners hang together")
     found.sort(key=lambda entry: -entry[0])
-    return [grid for _, grid in found[:_MOST_PLACEMENTS]]
+    even = [grid for _, grid in found[:_MOST_PLACEMENTS] if _is_even(grid)]
+    return even or Rejected(f"what looks like {len(lattice)} corners lies in no rows and columns")
 
 
 def in_board_order(grid: Grid, board: Board) -> Grid:

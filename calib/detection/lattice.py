@@ -49,7 +49,7 @@ def _turn(angle: float) -> float:
     return angle - 2 * math.pi * math.ceil(angle / (2 * math.pi) - 0.5)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _nearest_along(xy: Any, rays: Any, near: Any, alignment: float) -> Any:
     """(K, 4) the nearest candidate along each ray whose own ray points back, or -1.
 
@@ -82,19 +82,21 @@ def _nearest_along(xy: Any, rays: Any, near: Any, alignment: float) -> Any:
     return best
 
 
-def _links(candidates: Candidates) -> IntArray:
-    """(K, 4) mutual neighbours along each ray, -1 where there is none."""
+def _links(candidates: Candidates) -> tuple[IntArray, IntArray]:
+    """(K, 4) mutual neighbours along each ray, -1 where there is none, and their ray back."""
     K = len(candidates)
     count = min(_NEIGHBOURS, K)
     _, near = cKDTree(candidates.xy).query(candidates.xy, k=count)
     best = _nearest_along(
         candidates.xy, candidates.rays_rad, near.reshape(K, count), _ALIGNMENT_RAD
     )
-    answered = (best[best] == np.arange(K)[:, None, None]).any(axis=2)
-    return np.where((best >= 0) & answered, best, -1)
+    answers = best[best] == np.arange(K)[:, None, None]
+    return np.where((best >= 0) & answers.any(axis=2), best, -1), answers.argmax(axis=2)
 
 
-def _spread(start: int, links: IntArray, free: NDArray[np.bool_]) -> tuple[list[int], list[Any]]:
+def _spread(
+    start: int, links: list[list[int]], back: list[list[int]], free: list[bool]
+) -> tuple[list[int], list[tuple[int, int]]]:
     """Number the piece that hangs together with `start`, breadth first.
 
     Each member carries which of its rays is the +j direction; a step along ray k goes
@@ -110,17 +112,16 @@ def _spread(start: int, links: IntArray, free: NDArray[np.bool_]) -> tuple[list[
         p = queue.popleft()
         i, j, turn = place[p]
         for ray in range(4):
-            q = int(links[p, ray])
+            q = links[p][ray]
             if q < 0 or not free[q]:
                 continue
             quarter = (ray - turn) % 4
             cell = (i + moves[quarter][0], j + moves[quarter][1])
-            back = np.flatnonzero(links[q] == p)
-            if cell in taken or not len(back):
+            if cell in taken:
                 continue
             free[q] = False
             taken.add(cell)
-            place[q] = (*cell, (int(back[0]) - (quarter + 2)) % 4)
+            place[q] = (*cell, (back[p][ray] - (quarter + 2)) % 4)
             members.append(q)
             cells.append(cell)
             queue.append(q)
@@ -131,13 +132,15 @@ def grow_lattices(candidates: Candidates) -> list[Lattice]:
     """All pieces of at least six corners, the largest first."""
     if len(candidates) < _FEWEST_CORNERS:
         return []
-    links = _links(candidates)
-    free = (links >= 0).sum(axis=1) >= 1
+    links, back = _links(candidates)
+    neighbours = (links >= 0).sum(axis=1)
+    # plain lists: picking single numbers out of arrays takes several times as long
+    of_links, of_back, free = links.tolist(), back.tolist(), (neighbours >= 1).tolist()
     pieces = []
-    for start in np.argsort(-(links >= 0).sum(axis=1), kind="stable"):
+    for start in np.argsort(-neighbours, kind="stable").tolist():
         if not free[start]:
             continue
-        members, cells = _spread(int(start), links, free)
+        members, cells = _spread(start, of_links, of_back, free)
         if len(members) >= _FEWEST_CORNERS:
             # ray 0 of the start is its +j direction, and the sector after ray 0 is dark
             pieces.append(Lattice(np.array(cells), candidates.xy[members], dark_first=True))

@@ -333,7 +333,7 @@ def _minimise(p: Any, pixels: Any, count: int, shape: Any, A: Any, iterations: i
     return cost
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _fit(
     image: Any,
     starts: Any,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection import Detection, detect
+from calib.detection import Detection, detect, make_ready
 from calib.views import Board
 from cell.files.plan_file import Checks
 
@@ -26,6 +26,12 @@ class Verdict:
 
     fault: str | None
     detection: Detection | None = None
+
+
+def make_check_ready(checks: Checks) -> None:
+    """Have the search for the board compiled: the first frame is judged while the arm moves on."""
+    if checks.board:
+        make_ready()
 
 
 def check_frame(image: NDArray[np.generic], board: Board, checks: Checks) -> Verdict:

@@ -19,7 +19,7 @@ from calib.views import FloatArray
 from cell.errors import BadAnswer, DiskFailed, exit_status_of
 from cell.files.plan_file import Plan
 from cell.recording import RecordingWriter
-from cell.sequencer.checks import Verdict, check_frame
+from cell.sequencer.checks import Verdict, check_frame, make_check_ready
 from cell.sequencer.clock import Clock, HostClock
 from cell.sequencer.goal import Goal
 from cell.sequencer.guard import Guard
@@ -149,6 +149,8 @@ class Sequencer:
 
     def _connect(self) -> None:
         self._tell(State.CONNECTING)
+        # before there is an arm to watch: a compiler keeps every other thread from running
+        make_check_ready(self._plan.file.checks)
         start = self._arm.connect()
         joints = self._arm.guard.check_plan(self._plan, start)
         moves = pairwise((start, *joints))

@@ -23,6 +23,7 @@ from cell.errors import (
 from cell.files.parts import Box
 from cell.files.plan_file import Plan, View, read_plan
 from cell.recording import Header, RecordingWriter, read_recording
+from cell.sequencer import checks
 from cell.sequencer import sequencer as sequencer_module
 from cell.sequencer.checks import Verdict
 from cell.sequencer.clock import HostClock
@@ -527,3 +528,14 @@ def test_the_corners_of_a_board_on_the_flange_are_checked(bench: Bench) -> None:
         Guard(boxed, 0.1, 0.5).check_move(HOME, HOME, "here")
     in_hand = bench.plan.cell.model_copy(update={"keep_out": (beside,)})
     Guard(in_hand, 0.1, 0.5).check_move(HOME, HOME, "here")
+
+
+def test_the_search_for_the_board_is_compiled_before_there_is_an_arm_to_watch(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(tmp_path, PLAN)
+    calls: list[str] = []
+    monkeypatch.setattr(checks, "make_ready", lambda: calls.extend(["ready", *bench.arm.calls]))
+    bench.run()
+    assert calls == ["ready"]
+    assert bench.arm.calls

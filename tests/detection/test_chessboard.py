@@ -1,5 +1,6 @@
 import time
 
+import cv2
 import numpy as np
 import pytest
 from board_rendering import (
@@ -10,7 +11,7 @@ from board_rendering import (
     render_board,
 )
 
-from calib.detection import Rejected, detect
+from calib.detection import Rejected, detect, finder
 from calib.views import Board
 
 SHAPE = (480, 640)
@@ -171,6 +172,16 @@ def test_pictures_without_a_board_are_rejected_with_a_reason(image):
     assert isinstance(rejected, Rejected)
     assert not rejected
     assert rejected.reason
+
+
+def test_crossings_without_order_are_turned_down_before_any_fit(monkeypatch):
+    monkeypatch.setattr(finder, "fit_grid", lambda *_, **__: pytest.fail("fitted chance"))
+    coarse = np.random.default_rng(1).uniform(-1, 1, (60, 80)).astype(np.float32)
+    field = cv2.resize(coarse, (960, 720), interpolation=cv2.INTER_CUBIC)
+    image = np.clip(128 + 100 * np.clip(5 * field, -1, 1), 0, 255).astype(np.uint8)
+    rejected = detect(image, chessboard(5, 6))
+    assert isinstance(rejected, Rejected)
+    assert "no rows and columns" in rejected.reason
 
 
 def test_colour_and_sixteen_bits_are_read_alike():
