@@ -25,6 +25,7 @@ from calib.views import FloatArray, Views
 
 GOOD_SIGMA = 3.0
 """A corner within this many sigma of its place counts fully."""
+_FIRST_DAMPING = 1e-6
 SETTLED = 0.02
 """Weights that change by less, and noise levels by less of themselves, move no estimate."""
 BLOCK_FRAMES = 64
@@ -126,12 +127,12 @@ def _in_shared_numbers(
     to_pose = gram[:, a : a + 6]
     flange_t = np.swapaxes(flange, 1, 2)
     mapped = gram[:, :-1, :-1] @ mapping
-    p = mapping.shape[2]
+    n, q, p = mapping.shape
     frames = FrameEquations(
         own=flange_t @ to_pose[:, :, a : a + 6] @ flange,
         own_shared=flange_t @ mapped[:, a : a + 6],
         own_residual=(flange_t @ to_pose[:, :, -1:])[:, :, 0],
-        shared=mapping.reshape(-1, p).T @ mapped.reshape(-1, p),
+        shared=mapping.reshape(n * q, p).T @ mapped.reshape(n * q, p),
         shared_residual=np.einsum("nqi,nq->i", mapping, gram[:, :-1, -1]),
         square_sum=float(gram[:, -1, -1].sum()),
     )
@@ -210,7 +211,7 @@ class _Iteration:
         self.with_print = state.noise.print_m > 0.0
         self.robust = weight is None
         self.weight = views.seen.astype(np.float64) if weight is None else weight
-        self.damping = 1e-6
+        self.damping = _FIRST_DAMPING
         self.linearise()
 
     def linearise(self) -> None:
@@ -284,6 +285,7 @@ class _Iteration:
             changed = changed or bool(np.abs(weight - self.weight).max() > SETTLED)
             self.weight = weight
             self.equations, self.residual = self._assemble(self.found, self.state)
+        self.damping = _FIRST_DAMPING  # a search that has settled ends with a high one
         return changed
 
 
