@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calib.calibration.cross_validation import CrossValidation
+from calib.calibration.held_out import ChiSquare, HeldOut
 from calib.calibration.identifiability import Weakness
 from calib.calibration.result import (
     Calibration,
@@ -18,6 +20,7 @@ from calib.calibration.result import (
     Statistics,
 )
 from calib.calibration.uncertainty import UncertaintyMap
+from calib.calibration.verdict_words import why
 from calib.paper.focus_law import FocusLaw
 from calib.paper.scale_factors import ScaleFactor
 from calib.paper.zones import Zones
@@ -60,9 +63,39 @@ def as_mapping(calibration: Calibration, recording: str) -> dict[str, Any]:
         **_transforms(c.robot),
         "robot": None if c.robot is None else _robot(c.robot),
         "uncertainty": None if c.uncertainty is None else _uncertainty(c.uncertainty),
+        "cross_validation": None
+        if c.cross_validation is None
+        else _cross_validation(c.cross_validation),
         "not_separable": [_weakness(w) for w in c.weaknesses],
         "missing": dict(c.missing),
     }
+
+
+def _cross_validation(found: CrossValidation) -> dict[str, Any]:
+    return {
+        "verdict": found.verdict,
+        "why": why(found),
+        "factor": found.factor,
+        "folds": [list(frames) for frames in found.folds],
+        "held_out": _held_out(found.held_out),
+        "estimates": [dict(vars(move)) for move in found.moves],
+        "influential_frames": [dict(vars(pull)) for pull in found.pulls],
+    }
+
+
+def _held_out(held: HeldOut) -> dict[str, Any]:
+    band = np.sqrt(held.miss.band)
+    return {
+        "rms_px": held.rms_px,
+        "expected_px": held.expected_px,
+        "expected_band_px": (held.expected_px * band).tolist(),
+        "robot": _chi_square(held.robot),
+        "picture": _chi_square(held.picture),
+    }
+
+
+def _chi_square(found: ChiSquare) -> dict[str, Any]:
+    return {"per_freedom": found.each, "freedom": found.freedom, "band": list(found.band)}
 
 
 def _weakness(weakness: Weakness) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calib.calibration.baseline import Baseline, fit_baseline, fit_subset
+from calib.calibration.cross_validation import CrossValidation, cross_validate
 from calib.calibration.frames import usable_frames
 from calib.calibration.identifiability import Weakness, find_weaknesses
 from calib.calibration.joint_lens import FURTHER_NAMES
@@ -23,15 +24,14 @@ from calib.views import BoolArray, FloatArray, Views
 _HARDLY = 0.1
 """A corner of less weight lies more than five sigma off."""
 
-_ROBOT_RESULTS = (
-    "robot",
-    "joint_ml",
+_PAPER_RESULTS = (
     "scale_factors",
     "zones",
     "focus_law",
     "fixed_alpha_algebraic",
     "fixed_alpha_mle",
 )
+_ROBOT_RESULTS = ("robot", "joint_ml", "cross_validation", *_PAPER_RESULTS)
 
 
 def calibrate(views: Views) -> Calibration:
@@ -64,6 +64,7 @@ def calibrate(views: Views) -> Calibration:
         solutions["zhang_mle_no_skew"] = baseline.without_skew(views)
     reference = None if robot is None else robot.reference
     span_m = _distance_range_m(views, solutions.get("joint_ml", baseline.mle))
+    cross_validation = _cross_validation(views, robot, span_m, missing)
     return Calibration(
         frame=views.frame,
         used=baseline.used,
@@ -81,6 +82,7 @@ def calibrate(views: Views) -> Calibration:
         distance_range_m=span_m,
         weaknesses=_weaknesses(views, robot),
         uncertainty=_uncertainty(views, robot, span_m),
+        cross_validation=cross_validation,
     )
 
 
@@ -104,6 +106,20 @@ def _uncertainty(
     if robot is None or robot.joint is None:
         return None
     return uncertainty_map(robot.joint, views, span_m)
+
+
+def _cross_validation(
+    views: Views, robot: RobotFit | None, span_m: tuple[float, float], missing: dict[str, str]
+) -> CrossValidation | None:
+    if robot is None:
+        return None
+    try:
+        if robot.joint is None:
+            raise CalibrationError("the joint fit with the robot failed; hand-eye alone is known")
+        return cross_validate(robot.joint, views.take(robot.taken), span_m)
+    except CalibrationError as error:
+        missing["cross_validation"] = str(error)
+        return None
 
 
 def _distance_range_m(views: Views, solution: Solution) -> tuple[float, float]:
@@ -137,7 +153,7 @@ def _paper(
             views, baseline.used, baseline.weight, homographies, baseline.mle, robot.reference
         )
     except CalibrationError as error:
-        return PaperResult((), None, None, None, {}, dict.fromkeys(_ROBOT_RESULTS[2:], str(error)))
+        return PaperResult((), None, None, None, {}, dict.fromkeys(_PAPER_RESULTS, str(error)))
 
 
 def joint_solution(views: Views, baseline: Baseline, robot: RobotFit, joint: JointFit) -> Solution:

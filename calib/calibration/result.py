@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.calibration.cross_validation import CrossValidation
 from calib.calibration.identifiability import Weakness
 from calib.calibration.uncertainty import UncertaintyMap
 from calib.handeye import HandEye, chain
@@ -202,6 +203,8 @@ class Calibration:
         What the views of the joint fit cannot separate, and which views would.
     uncertainty:
         Of the joint fit's camera over image and distance; None without a joint fit.
+    cross_validation:
+        The joint fit without some of its frames; None with a reason in `missing`.
     """
 
     frame: np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -220,3 +223,4 @@ class Calibration:
     distance_range_m: tuple[float, float]
     weaknesses: tuple[Weakness, ...] = ()
     uncertainty: UncertaintyMap | None = None
+    cross_validation: CrossValidation | None = None

@@ -165,13 +165,21 @@ def workpiece_sigma_m(
     -------
     (D, G, 3) one sigma of its middle along the camera's axes, metres: right, down, away.
     """
+    return _sigma(workpiece_change_m(joint, views, pixels_px, distance_m), joint.covariance)
+
+
+def workpiece_change_m(
+    joint: Estimate, views: Views, pixels_px: FloatArray, distance_m: FloatArray
+) -> FloatArray:
+    """(D, G, 3, p) of that place, by each of the p numbers; see `workpiece_sigma_m`."""
     out = []
     for d in distance_m:
         part, _ = _part(joint, views, float(d))
         shown = _shown(joint, views, part, pixels_px, float(d))
         change = _change_of_pixels(joint, shown)
-        located = _change_of_place(joint, shown) @ change.reshape(len(shown), -1, change.shape[-1])
-        out.append(_sigma(located, joint.covariance))
+        out.append(
+            _change_of_place(joint, shown) @ change.reshape(len(shown), -1, change.shape[-1])
+        )
     return np.array(out)
 
 

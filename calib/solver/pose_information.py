@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from calib.chain.effect import Present
 from calib.chain.model import CellModel, kinematics_of, predict
-from calib.solver.accumulate import local_equations
+from calib.solver.each_frame import each_frame
 from calib.solver.elimination import solve_scaled
 from calib.solver.noise import Noise
 from calib.solver.unknowns import Unknown, amount_unknowns, dependence, unknowns_of
@@ -102,24 +102,9 @@ def _batch(
 ) -> FloatArray:
     views = shown(model, views)
     found = dependence(model, views, unknowns, kinematics=kinematics_of(views), flange_error=None)
-    state = found.state
-    local = local_equations(
-        state.optics,
-        state.camera_from_board,
-        state.points_m,
-        views.corners_px,
-        views.seen / noise.corner_px**2,
-        found.active,
-        found.modes,
-    )
-    a = len(found.active)
-    gram = local.gram[:, :-1, :-1]
-    mapped = gram @ found.local
-    flange_t = np.swapaxes(found.flange, 1, 2)
-    own = flange_t @ gram[:, a : a + 6, a : a + 6] @ found.flange + noise.flange_information
-    cross = flange_t @ mapped[:, a : a + 6]
-    shared = np.swapaxes(found.local, 1, 2) @ mapped
-    return np.asarray(shared - np.swapaxes(cross, 1, 2) @ np.linalg.solve(own, cross))
+    still = np.zeros((len(views), 6))
+    frames = each_frame(found, views.corners_px, views.seen / noise.corner_px**2, still)
+    return frames.marginal(noise.flange_information)[:, :-1, :-1]
 
 
 def project_out(

@@ -25,6 +25,9 @@ def calibration_summary(calibration: Mapping[str, Any]) -> str:
         lines.append(f"focus law {law['law']}: {values}")
     lines.append(f"{'solution':42}{'alpha px':>10}{'rms px':>9}{'camera off by mm':>18}")
     lines += [_solution(name, found) for name, found in calibration["solutions"].items()]
+    checked = calibration.get("cross_validation")
+    if checked:
+        lines.append(f"cross-validation: {checked['why']}")
     return "\n".join(lines)
 
 

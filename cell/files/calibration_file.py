@@ -221,6 +221,72 @@ class UncertaintyPart(ResultPart):
     """(D, G, 3) right, down, away: of where the robot is told a part is, from one picture."""
 
 
+class ChiSquarePart(ResultPart):
+    """Square sum of misses in units of what is expected of them."""
+
+    per_freedom: Sigma
+    """One where all that is said of the uncertainty is true."""
+    freedom: PositiveFloat
+    band: tuple[float, float]
+    """Where it then lies at least 99 times in a hundred."""
+
+
+class HeldOutPart(ResultPart):
+    """Every frame, predicted by the fit that had no say of it; distances of corners, RMS."""
+
+    rms_px: Sigma
+    """From where the fit and the logged pose put them."""
+    expected_px: Sigma
+    """What corner noise, the robot's scatter and the fit's uncertainty would make."""
+    expected_band_px: tuple[float, float]
+    """Where `rms_px` then lies at least 99 times in a hundred."""
+    robot: ChiSquarePart
+    """Of the six numbers a frame that a free pose of the robot absorbs."""
+    picture: ChiSquarePart
+    """Of what the pictures show whatever the robot does."""
+
+
+class EstimateMoved(ResultPart):
+    """How far the fits without a fold are from the fit of all frames, in units of uncertainty."""
+
+    quantity: str
+    largest_z: Sigma
+    """In sigmas of the difference: root of the fold's variance less that of all frames."""
+    fold: int
+    """Which fold was left out there."""
+    factor: Sigma
+    """RMS of the moves in all directions; about one where the stated sigma is right."""
+    p_value: float
+    """Of moves as large as these by chance."""
+    drift_p_value: float
+    """Of moves that grow as much from the earliest frames to the latest, by chance."""
+
+
+class InfluentialFrame(ResultPart):
+    """A frame without which an estimate would be another one, by more than chance."""
+
+    frame: int
+    quantity: str
+    sigmas: Sigma
+    """How far it moves, in sigmas of the fit of all frames."""
+    z: Sigma
+    """The same in sigmas of that move."""
+
+
+class CrossValidationPart(ResultPart):
+    """The joint fit repeated without each fold of its frames."""
+
+    verdict: Literal["agree", "sigma_too_small", "single_frames"]
+    why: str
+    factor: PositiveFloat
+    """How many times the stated sigmas the frames ask for; one where they do not."""
+    folds: tuple[tuple[int, ...], ...]
+    """Frames of each fold; the earliest of each distance in the first."""
+    held_out: HeldOutPart
+    estimates: tuple[EstimateMoved, ...]
+    influential_frames: tuple[InfluentialFrame, ...]
+
+
 class CornersLeftOut(ResultPart):
     """Corners of a used frame that lie too far off to be detections of the board."""
 
@@ -263,6 +329,8 @@ class CalibrationFile(ResultPart):
     robot: RobotPart | None
     uncertainty: UncertaintyPart | None = None
     """Null without a joint fit."""
+    cross_validation: CrossValidationPart | None = None
+    """Whether other frames would have given the same; null with a reason in `missing`."""
     not_separable: tuple[NotSeparable, ...] = ()
     """What the views of the joint fit cannot tell apart, the worst first."""
     missing: dict[str, str]

@@ -27,7 +27,7 @@ def test_the_page_prints_what_it_shows(tmp_path: Path, monkeypatch: pytest.Monke
         elif block.language == "text":
             assert_same(printed, block.code)
             compared += 1
-    assert compared == 6
+    assert compared == 7
 
 
 def test_every_name_of_the_api_is_there_and_documented() -> None:

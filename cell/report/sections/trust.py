@@ -10,6 +10,7 @@ from cell.report.data import ReportData
 from cell.report.figures.workpiece import corrected, of_solution
 from cell.report.geometry import workpiece_error_m
 from cell.report.numbers import known, measured, millimetres, number, solution_name
+from cell.report.sections.cross_validation import cross_validation_sentences
 from cell.report.sections.uncertainty import uncertainty_sentences
 
 _MANY_TIMES = 3.0
@@ -20,6 +21,7 @@ def sentences(data: ReportData) -> list[str]:
     return [
         *_scale(data),
         *uncertainty_sentences(data),
+        *cross_validation_sentences(data),
         *_corrected(data),
         *_zhang(data),
         *_truth(data),

@@ -10,6 +10,7 @@ import numpy as np
 from cell.report import html
 from cell.report.data import ReportData
 from cell.report.numbers import millimetres, number
+from cell.report.sections.cross_validation import cross_validation
 
 
 def uncertainty(data: ReportData) -> str:
@@ -20,6 +21,7 @@ def uncertainty(data: ReportData) -> str:
         "Uncertainty of the camera, and what the views cannot tell apart",
         _told(calibration.get("uncertainty")),
         _not_separable(calibration),
+        cross_validation(calibration),
     )
 
 
