@@ -120,7 +120,7 @@ class Journey:
         flange_error: FloatArray | None = None,
     ) -> None:
         self.state = start(model, views, kinematics or kinematics_of(views))
-        self._route = route(model)
+        self._model, self._route = model, route(model)
         self._flange_error = flange_error
         self._before: list[Walk] = []
         for stop in self._route:
@@ -147,8 +147,18 @@ class Journey:
             state.base_from_fixed = np.repeat(changed.base_from_fixed[None], n, axis=0)
         if first <= self.placed:
             state.optics = np.repeat(changed.optics[None], n, axis=0)
+        return self._on(state, changed, first)
+
+    def nudged(self, step: FloatArray) -> Walk:
+        """The walk with every flange off by a (6,) increment more, in its own frame."""
+        first = self._route.index("arm") + 1
+        state = self._before[first].copy()
+        state.base_from_flange = rigid.product(state.base_from_flange, rigid.from_vector(step))
+        return self._on(state, self._model, first)
+
+    def _on(self, state: Walk, model: CellModel, first: int) -> Walk:
         for stop in self._route[first:]:
-            _call_at(state, stop, changed, self._flange_error)
+            _call_at(state, stop, model, self._flange_error)
         return state
 
 

@@ -23,6 +23,11 @@ NOTHING, BROWN, EVERYTHING = 0, 1, 2
 by every column. The rare ones (tilt, pupil, window, sweep) cost more than all others together."""
 
 FIRST_RARE, LAST_RARE = COLUMN["tilt_x_rad"], COLUMN["sweep_rz_rad"]
+FIRST_SWEEP, HEIGHT = COLUMN["sweep_x_m"], COLUMN["height_px"]
+ROW_STEPS, ROW_SETTLED_PX = 40, 1e-11
+"""A board that moves by a tenth of the picture while it is read needs about a dozen steps."""
+
+UNIT = np.eye(4)
 N2 = WINDOW_INDEX * WINDOW_INDEX
 
 
@@ -85,10 +90,9 @@ def _tilted(tilt, xd, yd, j):  # type: ignore[no-untyped-def]
 # One straight run of assignments: split, numba would pass every intermediate through arrays.
 @njit(cache=True, error_model="numpy")
 def _corner(o, tilt, pose, px, py, pz, uv, j_pose, j_optics, shift, jt, derive):  # type: ignore[no-untyped-def]  # noqa: PLR0915
-    """One corner: pixel into `uv`; Jacobians by `derive` into (2, 6) and (2, K) arrays.
+    """One corner of a board at rest: pixel into `uv`; Jacobians by `derive` into (2, 6), (2, K).
 
-    `tilt` is the frame's, from `_tilt_of`.
-    A rolling shutter and the rare columns' derivatives are seen to only with `EVERYTHING`.
+    `tilt` is the frame's, from `_tilt_of`. The rare columns' derivatives need `EVERYTHING`.
     """
     x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
     y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
@@ -178,7 +182,10 @@ def _corner(o, tilt, pose, px, py, pz, uv, j_pose, j_optics, shift, jt, derive):
     j_optics[1, 19] = vs * shift[3]
     j_optics[0, 20] = us * shift[4]
     j_optics[1, 20] = vs * shift[4]
-    _sweep(o, uv, j_pose, j_optics)
+    late = uv[1] / o[HEIGHT] - 0.5
+    for k in range(6):
+        j_optics[0, FIRST_SWEEP + k] = j_pose[0, k] * late
+        j_optics[1, FIRST_SWEEP + k] = j_pose[1, k] * late
 
 
 @njit(cache=True, error_model="numpy")
@@ -198,18 +205,52 @@ def _tilt_derivative(o, tilt, xd, yd, xt, yt, j_optics):  # type: ignore[no-unty
 
 
 @njit(cache=True, error_model="numpy")
-def _sweep(o, uv, j_pose, j_optics):  # type: ignore[no-untyped-def]
-    """Move the corner by what the board swept until its row was read (first order)."""
-    when = uv[1] / o[27] - 0.5
-    du = 0.0
-    dv = 0.0
-    for k in range(6):
-        du += j_pose[0, k] * o[21 + k]
-        dv += j_pose[1, k] * o[21 + k]
-        j_optics[0, 21 + k] = j_pose[0, k] * when
-        j_optics[1, 21 + k] = j_pose[1, k] * when
-    uv[0] += du * when
-    uv[1] += dv * when
+def _swept(o, tilt, pose, px, py, pz, uv, j_pose, j_optics, shift, jt, derive):  # type: ignore[no-untyped-def]
+    """`_corner` of a board that moves on: the corner as it is when its own row is read.
+
+    `uv` holds where it is seen at rest. The row is found by stepping to where the corner is when
+    the row before is read; the derivatives are those of the implicit equation. Within a frame the
+    corner goes straight on.
+    """
+    x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
+    y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
+    z = pose[2, 0] * px + pose[2, 1] * py + pose[2, 2] * pz + pose[2, 3]
+    tx, ty, tz, rx, ry, rz = o[21], o[22], o[23], o[24], o[25], o[26]
+    mx, my, mz = tx + ry * z - rz * y, ty + rz * x - rx * z, tz + rx * y - ry * x
+    late = 0.0
+    for _ in range(ROW_STEPS):
+        row = uv[1]
+        late = row / o[HEIGHT] - 0.5
+        xs, ys, zs = x + late * mx, y + late * my, z + late * mz
+        _corner(o, tilt, UNIT, xs, ys, zs, uv, j_pose, j_optics, shift, jt, NOTHING)
+        if abs(uv[1] - row) < ROW_SETTLED_PX:
+            break
+    if derive == NOTHING:
+        return
+    _corner(o, tilt, UNIT, xs, ys, zs, uv, j_pose, j_optics, shift, jt, derive)
+    by_row = np.empty(2)
+    for i in range(2):
+        gx, gy, gz = j_pose[i, 0], j_pose[i, 1], j_pose[i, 2]
+        by_row[i] = (gx * mx + gy * my + gz * mz) / o[HEIGHT]
+        qx = gx + late * (gy * rz - gz * ry)
+        qy = gy + late * (gz * rx - gx * rz)
+        qz = gz + late * (gx * ry - gy * rx)
+        j_pose[i, 0], j_pose[i, 1], j_pose[i, 2] = qx, qy, qz
+        j_pose[i, 3], j_pose[i, 4], j_pose[i, 5] = y * qz - z * qy, z * qx - x * qz, x * qy - y * qx
+        j_optics[i, 21], j_optics[i, 22], j_optics[i, 23] = late * gx, late * gy, late * gz
+        j_optics[i, 24] = late * (y * gz - z * gy)
+        j_optics[i, 25] = late * (z * gx - x * gz)
+        j_optics[i, 26] = late * (x * gy - y * gx)
+    # a corner seen lower is read later, and has moved on by then
+    for j in (j_pose, j_optics):
+        j[1] /= 1.0 - by_row[1]
+        j[0] += by_row[0] * j[1]
+
+
+@njit(cache=True, error_model="numpy")
+def _has_sweep(o):  # type: ignore[no-untyped-def]
+    """Whether the board moves while this frame's rows are read."""
+    return np.any(o[FIRST_SWEEP : LAST_RARE + 1] != 0.0)
 
 
 @njit(cache=True, error_model="numpy")
@@ -228,10 +269,13 @@ def _project_all(optics, poses, points, uv, j_pose, j_optics, derive):  # type: 
     for i in range(poses.shape[0]):
         o = optics[i]
         _tilt_of(o, tilt)
-        need = EVERYTHING if derive or _has_rare(o) else NOTHING
+        need = EVERYTHING if derive else NOTHING
+        sweeps = _has_sweep(o)
         for j in range(points.shape[0]):
             p = points[j]
             _corner(o, tilt, poses[i], p[0], p[1], p[2], uv[i, j], jp, jo, shift, jt, need)
+            if sweeps:
+                _swept(o, tilt, poses[i], p[0], p[1], p[2], uv[i, j], jp, jo, shift, jt, need)
             if derive:
                 j_pose[i, j] = jp
                 j_optics[i, j] = jo

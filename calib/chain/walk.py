@@ -134,19 +134,18 @@ class Walk:
         camera_from_base = rigid.inverse(self.base_from_camera)
         self.camera_from_board = rigid.product(camera_from_base, self.base_from_board)
 
-    def board_sweep(self, duration_s: float) -> FloatArray:
-        """(N, 6) increment by which the board moves in the camera's frame during `duration_s`."""
+    def pose_by_flange(self) -> FloatArray:
+        """(N, 6, 6) increment of camera_from_board for a small increment of the flange."""
+        if self.in_hand:
+            return -rigid.adjoint(rigid.inverse(self.flange_from_mounted))
+        return rigid.adjoint(
+            rigid.product(rigid.inverse(self.base_from_fixed), self.base_from_flange)
+        )
+
+    def board_velocity(self) -> FloatArray:
+        """(N, 6) of the board in the camera's frame, m/s and rad/s; zero where not known."""
         if self.arm is None:
             return np.zeros((len(self.views), 6))
-        speed = np.nan_to_num(self.views.joint_velocity_rad_s)
-        joints = self.joints_rad
-        now = self.arm.forward(joints)
-        later = self.arm.forward(joints + speed * duration_s)
-        flange_step = rigid.inverse(now) @ later
-        if self.in_hand:
-            mounted = self.flange_from_mounted
-            camera_step = rigid.inverse(mounted) @ flange_step @ mounted
-            return np.nan_to_num(rigid.to_vector(rigid.inverse(camera_step)))
-        camera_from_flange = rigid.inverse(self.base_from_fixed) @ self.base_from_flange
-        step = camera_from_flange @ flange_step @ rigid.inverse(camera_from_flange)
-        return np.nan_to_num(rigid.to_vector(step))
+        speed = self.views.joint_velocity_rad_s[..., None]
+        flange = self.arm.flange_jacobian(self.joints_rad, self.dh_offset) @ speed
+        return np.nan_to_num((self.pose_by_flange() @ flange)[..., 0])

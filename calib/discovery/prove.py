@@ -52,10 +52,11 @@ def floor_of(model: CellModel, views: Views, noise: Noise) -> Floor:
     """Prediction error that noise alone makes on these frames, and how likely they are."""
     found = dependence(model, views, (), kinematics=kinematics_of(views), flange_error=None)
     state = found.state
-    pixels, j_pose, _ = project_with_jacobians(
+    pixels, j_pose, j_optics = project_with_jacobians(
         state.optics, state.camera_from_board, state.points_m
     )
-    jacobian = j_pose @ found.flange[:, None]
+    columns = np.concatenate([j_optics[..., list(found.active)], j_pose], axis=-1)
+    jacobian = columns @ found.flange[:, None]
     spread = np.linalg.inv(noise.flange_information)
     square, nll = [], 0.0
     for i in range(len(views)):

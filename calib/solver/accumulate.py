@@ -16,6 +16,8 @@ from calib.chain.projection import (
     K,
     _corner,
     _has_rare,
+    _has_sweep,
+    _swept,
     _tilt_of,
 )
 from calib.views import FloatArray
@@ -90,6 +92,7 @@ def _accumulate(optics, poses, points, uv, weight, active, basis, gram, residual
         pose = poses[i]
         _tilt_of(o, tilt)
         derive = EVERYTHING if rare or _has_rare(o) else BROWN
+        sweeps = _has_sweep(o)
         filled = 0
         for j in range(points.shape[0]):
             w = weight[i, j]
@@ -97,6 +100,8 @@ def _accumulate(optics, poses, points, uv, weight, active, basis, gram, residual
                 continue
             p = points[j]
             _corner(o, tilt, pose, p[0], p[1], p[2], seen, jp, jo, shift, jt, derive)
+            if sweeps:
+                _swept(o, tilt, pose, p[0], p[1], p[2], seen, jp, jo, shift, jt, derive)
             root = math.sqrt(w)
             for c in range(2):
                 at = filled + c

@@ -80,10 +80,10 @@ def each_frame(
     mapping[:, -1, -1] = 1.0
     mapped = local.gram @ mapping
     flange_t = np.swapaxes(found.flange, 1, 2)
-    pose = slice(len(found.active), len(found.active) + 6)
+    followed = found.flange.shape[1]
     return EachFrame(
-        own=flange_t @ local.gram[:, pose, pose] @ found.flange,
-        cross=flange_t @ mapped[:, pose],
+        own=flange_t @ local.gram[:, :followed, :followed] @ found.flange,
+        cross=flange_t @ mapped[:, :followed],
         shared=np.swapaxes(mapping, 1, 2) @ mapped,
         flange_error=flange_error,
     )

@@ -90,15 +90,14 @@ def _with_corners(
     flange: FloatArray,
     mapping: FloatArray,
     equations: FrameEquations,
-    a: int,
 ) -> FrameEquations:
     """Append each corner's own in-plane shift to the shared numbers."""
     assert local.cross is not None
     assert local.own is not None
     n, m = local.own.shape[:2]
     cross = local.cross.reshape(n, 2 * m, -1)
-    p = mapping.shape[2]
-    own_corner = np.einsum("nqk,ncq->nkc", flange, cross[:, :, a : a + 6])
+    followed, p = flange.shape[1], mapping.shape[2]
+    own_corner = np.einsum("nqk,ncq->nkc", flange, cross[:, :, :followed])
     shared_corner = np.einsum("ncq,nqp->pc", cross[:, :, :-1], mapping, optimize=True)
     shared = np.zeros((p + 2 * m, p + 2 * m))
     shared[:p, :p] = equations.shared
@@ -120,23 +119,22 @@ def _with_corners(
 
 
 def _in_shared_numbers(
-    local: LocalEquations, flange: FloatArray, mapping: FloatArray, a: int
+    local: LocalEquations, flange: FloatArray, mapping: FloatArray
 ) -> FrameEquations:
-    """A block's equations in flange errors and shared numbers; `a` optics columns are active."""
-    gram = local.gram
-    to_pose = gram[:, a : a + 6]
+    """A block's equations in flange errors and shared numbers."""
+    gram, followed = local.gram, flange.shape[1]
     flange_t = np.swapaxes(flange, 1, 2)
     mapped = gram[:, :-1, :-1] @ mapping
     n, q, p = mapping.shape
     frames = FrameEquations(
-        own=flange_t @ to_pose[:, :, a : a + 6] @ flange,
-        own_shared=flange_t @ mapped[:, a : a + 6],
-        own_residual=(flange_t @ to_pose[:, :, -1:])[:, :, 0],
+        own=flange_t @ gram[:, :followed, :followed] @ flange,
+        own_shared=flange_t @ mapped[:, :followed],
+        own_residual=(flange_t @ gram[:, :followed, -1:])[:, :, 0],
         shared=mapping.reshape(n * q, p).T @ mapped.reshape(n * q, p),
         shared_residual=np.einsum("nqi,nq->i", mapping, gram[:, :-1, -1]),
         square_sum=float(gram[:, -1, -1].sum()),
     )
-    return frames if local.own is None else _with_corners(local, flange, mapping, frames, a)
+    return frames if local.own is None else _with_corners(local, flange, mapping, frames)
 
 
 def assemble(
@@ -169,7 +167,7 @@ def assemble(
         )
         residual[block] = local.residual_px
         flange, mapping = found.flange[block], found.local[block]
-        parts.append(_in_shared_numbers(local, flange, mapping, len(found.active)))
+        parts.append(_in_shared_numbers(local, flange, mapping))
     equations = JointEquations(
         frames=gathered(parts),
         flange_error=flange_error,

@@ -16,6 +16,8 @@ from calib.chain.walk import Walk
 from calib.views import FloatArray, Views
 
 _STEP_SHARE = 1e-4
+_FLANGE_STEP = 1e-5
+"""Metres and radians."""
 _OPTICS_TYPICAL = {"alpha_px": 10.0, "beta_px": 10.0, "u0_px": 10.0, "v0_px": 10.0, "skew_px": 5.0}
 PLAIN_OPTICS = ("alpha_px", "beta_px", "u0_px", "v0_px", "k1", "k2")
 """What the plain model frees: one focal length a side, principal point, two radial terms."""
@@ -82,8 +84,13 @@ def amount_unknowns(model: CellModel, base: tuple[Unknown, ...]) -> tuple[Unknow
     )
 
 
-def moved(model: CellModel, unknowns: tuple[Unknown, ...], step: FloatArray) -> CellModel:
-    """The cell after adding (p,) `step` to its free numbers; transforms move on their own side."""
+def moved(
+    model: CellModel, unknowns: tuple[Unknown, ...], step: FloatArray, *, bounded: bool = True
+) -> CellModel:
+    """The cell after adding (p,) `step` to its free numbers; transforms move on their own side.
+
+    `bounded` keeps effects' numbers between their lowest and highest.
+    """
     optics = model.optics.copy()
     effects = list(model.effects)
     increments = {"flange_from_mounted": np.zeros(6), "base_from_fixed": np.zeros(6)}
@@ -92,7 +99,7 @@ def moved(model: CellModel, unknowns: tuple[Unknown, ...], step: FloatArray) -> 
         if kind == "optics":
             optics[at] += amount
         elif kind == "effect":
-            effects[at] = _nudged(effects[at], k, float(amount))
+            effects[at] = _nudged(effects[at], k, float(amount), bounded)
         else:
             increments[kind][at] += amount
     changed = {
@@ -130,10 +137,12 @@ def prior_information(unknowns: tuple[Unknown, ...]) -> FloatArray:
     return np.array([u.prior_sigma**-2.0 for u in unknowns])
 
 
-def _nudged(present: Present, k: int, amount: float) -> Present:
+def _nudged(present: Present, k: int, amount: float, bounded: bool) -> Present:
     parameter = present.effect.parameters[k]
     values = present.values.copy()
-    values[k] = min(max(values[k] + amount, parameter.low), parameter.high)
+    values[k] += amount
+    if bounded:
+        values[k] = min(max(values[k], parameter.low), parameter.high)
     return replace(present, values=values)
 
 
@@ -152,7 +161,8 @@ class Dependence:
     local:
         (N, A + 6 + B, p).
     flange:
-        (N, 6, 6) how the pose in the camera follows a small error of the flange in its own frame.
+        (N, A + 6, 6) how the active optics and the pose in the camera follow a small error of the
+        flange in its own frame: a lens that focuses on the board follows it as well.
     """
 
     state: Walk
@@ -161,12 +171,10 @@ class Dependence:
     local: FloatArray
     flange: FloatArray
 
-
-def flange_to_pose(state: Walk) -> FloatArray:
-    """(N, 6, 6) increment of camera_from_board for a small increment of the flange."""
-    if state.in_hand:
-        return -rigid.adjoint(rigid.inverse(state.flange_from_mounted))
-    return rigid.adjoint(rigid.inverse(state.base_from_fixed) @ state.base_from_flange)
+    @property
+    def pose_by_flange(self) -> FloatArray:
+        """(N, 6, 6) the pose's share of `flange`."""
+        return self.flange[:, len(self.active) :]
 
 
 def dependence(
@@ -180,23 +188,26 @@ def dependence(
     """Differentiate the walk by every free number (central differences, one walk a side)."""
     journey = Journey(model, views, kinematics=kinematics, flange_error=flange_error)
     columns = [_column(journey, model, unknown) for unknown in unknowns]
+    by_flange = [_flange_column(journey, k) for k in range(6)]
     n, p = len(views), len(unknowns)
     followed = np.zeros(len(model.optics), dtype=bool)
-    for column in columns:
+    for column in (*columns, *by_flange):
         followed[column.followed] = True
     active = np.flatnonzero(followed)
     moving = [k for k, c in enumerate(columns) if c.points is not None and c.points.any()]
     a = len(active)
     local = np.zeros((n, a + 6 + len(moving), p))
-    for k, column in enumerate(columns):
-        local[:, np.searchsorted(active, column.followed), k] = column.optics
-        if column.pose is not None:
-            local[:, a : a + 6, k] = column.pose
+    flange = np.zeros((n, a + 6, 6))
+    for into, found in ((local, columns), (flange, by_flange)):
+        for k, column in enumerate(found):
+            into[:, np.searchsorted(active, column.followed), k] = column.optics
+            if column.pose is not None:
+                into[:, a : a + 6, k] = column.pose
     for b, k in enumerate(moving):
         local[:, a + 6 + b, k] = 1.0
     state = journey.state
     modes = np.array([columns[k].points for k in moving]).reshape(-1, *state.points_m.shape)
-    return Dependence(state, tuple(int(c) for c in active), modes, local, flange_to_pose(state))
+    return Dependence(state, tuple(int(c) for c in active), modes, local, flange)
 
 
 @dataclass(frozen=True)
@@ -215,13 +226,26 @@ class _Column:
 def _column(journey: Journey, model: CellModel, unknown: Unknown) -> _Column:
     first = journey.entry(unknown.place)
     step = np.array([unknown.typical * _STEP_SHARE])
-    plus = journey.again(moved(model, (unknown,), step), first)
-    minus = journey.again(moved(model, (unknown,), -step), first)
-    scale = 0.5 / step[0]
+    # bounds would halve the difference of a number that stands at one
+    plus = journey.again(moved(model, (unknown,), step, bounded=False), first)
+    minus = journey.again(moved(model, (unknown,), -step, bounded=False), first)
+    return _difference(journey, plus, minus, 0.5 / step[0], placed=first >= journey.placed)
+
+
+def _flange_column(journey: Journey, k: int) -> _Column:
+    step = _FLANGE_STEP * np.eye(6)[k]
+    plus, minus = journey.nudged(step), journey.nudged(-step)
+    return _difference(journey, plus, minus, 0.5 / _FLANGE_STEP, placed=False)
+
+
+def _difference(
+    journey: Journey, plus: Walk, minus: Walk, scale: float, *, placed: bool
+) -> _Column:
+    """`placed` where the number enters after the pose, which then stays."""
     optics = (plus.optics - minus.optics) * scale
     followed = np.flatnonzero(optics.any(axis=0))
     optics = optics[:, followed]
-    if first >= journey.placed:
+    if placed:
         return _Column(followed, optics, None, None)
     rate = (plus.camera_from_board - minus.camera_from_board) * scale
     back = rigid.inverse(journey.state.camera_from_board)

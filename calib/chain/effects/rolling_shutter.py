@@ -10,7 +10,7 @@ from calib.views import FloatArray
 
 def _act(values: FloatArray, walk: Walk) -> None:
     first = COLUMN["sweep_x_m"]
-    walk.optics[:, first : first + 6] += walk.board_sweep(1e-3) * (values[0] / 1e-3)
+    walk.optics[:, first : first + 6] += values[0] * walk.board_velocity()
     walk.column("height_px")[:] = walk.views.height_px
 
 
@@ -18,7 +18,7 @@ EFFECT = Effect(
     name="rolling_shutter",
     link="sensor",
     physics="The sensor's rows are exposed one after another while the arm moves.",
-    equation="pixel += d(pixel)/dt * readout_s * (v / height - 1/2)",
+    equation="a corner is seen where it is readout_s * (v / height - 1/2) later, v its row there",
     source="Hedborg, Forssen, Felsberg, Ringaby 2012",
     parameters=(Parameter("readout_s", "s", 0.02, -0.2, 0.2),),
     act=_act,

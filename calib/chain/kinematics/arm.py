@@ -82,6 +82,16 @@ class ArmKinematics:
         stacked = np.concatenate([np.cross(axes, arms), axes], axis=-1)
         return np.swapaxes(stacked, -1, -2)
 
+    def flange_jacobian(
+        self, joints_rad: FloatArray, dh_offset: FloatArray | None = None
+    ) -> FloatArray:
+        """`jacobian` (..., 6, 6) in the flange's own frame."""
+        to_flange = np.swapaxes(self.forward(joints_rad, dh_offset)[..., :3, :3], -1, -2)
+        jacobian = self.jacobian(joints_rad, dh_offset)
+        return np.concatenate(
+            [to_flange @ jacobian[..., :3, :], to_flange @ jacobian[..., 3:, :]], -2
+        )
+
     def inverse_all(
         self, base_from_flange: FloatArray, near_rad: FloatArray | None = None
     ) -> FloatArray:

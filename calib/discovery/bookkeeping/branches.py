@@ -118,15 +118,12 @@ def _problem(
 ) -> _Problem:
     found = fit.dependence
     a = len(found.active)
-    to_flange = np.linalg.inv(found.flange)
+    to_flange = np.linalg.inv(found.pose_by_flange)
     pose_columns = np.flatnonzero(np.abs(found.local[:, a : a + 6]).max(axis=(0, 1)))
     scale = np.array([1.0 / fit.noise.flange_m] * 3 + [1.0 / fit.noise.flange_rad] * 3)
     nuisance = to_flange @ found.local[:, a : a + 6][:, :, pose_columns]
     safe = np.where(np.isfinite(branches), branches, 0.0)
-    jacobian = kinematics.jacobian(safe)
-    turn = np.swapaxes(kinematics.forward(safe)[..., :3, :3], -1, -2)
-    body = np.concatenate([turn @ jacobian[..., :3, :], turn @ jacobian[..., 3:, :]], axis=-2)
-    columns = body @ fault(safe, kinematics)
+    columns = kinematics.flange_jacobian(safe) @ fault(safe, kinematics)
     return _Problem(
         fit.flange_error * scale,
         nuisance * scale[:, None],

@@ -10,9 +10,15 @@ from __future__ import annotations
 from typing import Any
 
 import autograd.numpy as anp
+from autograd.tracer import getval
 
 Array = Any
 INDEX = 1.5
+
+
+def plain(value: Array) -> Any:
+    """The number without its derivatives, for decisions."""
+    return getval(value)
 
 
 def cross_matrix(w: Array) -> Array:
@@ -81,3 +87,17 @@ def pixel(o: dict[str, Array], p: Array) -> Array:
     u = o["alpha_px"] * t[0] / t[2] + o["skew_px"] * t[1] / t[2] + o["u0_px"]
     v = o["beta_px"] * t[1] / t[2] + o["v0_px"]
     return anp.array([u, v])
+
+
+SWEEP = tuple(f"sweep_{part}" for part in ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"))
+
+
+def swept_pixel(o: dict[str, Array], p: Array) -> Array:
+    """`pixel` of (3, ...) points that move on until their rows are read."""
+    sweep = anp.stack([o[name] for name in SWEEP])
+    along = anp.reshape(sweep[:3], (3,) + (1,) * (p.ndim - 1))
+    motion = along + anp.dot(cross_matrix(sweep[3:]), p)
+    seen = pixel(o, p)
+    for _ in range(12 if plain(sweep).any() else 1):
+        seen = pixel(o, p + (seen[1] / o["height_px"] - 0.5) * motion)
+    return seen
