@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cell.cli.output import JsonFlag, same_folder, show
+from cell.cli.output import JsonFlag, same_folder, say, show
 from cell.errors import EXIT_BAD_ANSWER
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def study(
     ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Run a study, or the rest of one: results of tasks that are done stay as they are."""
+    """Run a study, or the rest of one: what is done stays, what failed is tried again."""
     from cell.study.extra import require_extra
 
     require_extra()
@@ -45,28 +45,35 @@ def study(
     folder = output or same_folder(read.file.name)
     with signals_ask(stop), counted_progress("tasks") as listener:
         outcome = run_study(
-            read, folder, scheduler=scheduler, workers=workers, stop=stop, listener=listener
+            read,
+            folder,
+            scheduler=scheduler,
+            workers=workers,
+            stop=stop,
+            listener=listener,
+            say=say,
         )
     if as_json:
         show("", _mapping(outcome), as_json=True)
     else:
-        _print(outcome)
+        _print(outcome, on_cluster=scheduler is not None)
     if outcome.failed:
         raise typer.Exit(EXIT_BAD_ANSWER)
 
 
 def _mapping(outcome: Outcome) -> dict[str, Any]:
-    failed = [{"key": row["key"], "reason": row["reason"]} for row in outcome.failed]
+    failed = [{name: row[name] for name in ("key", "reason", "tries")} for row in outcome.failed]
     return {
         "folder": str(outcome.folder),
         "results": str(outcome.results),
-        "tasks": len(outcome.rows),
+        "failures": str(outcome.failures),
+        "tasks": len(outcome.rows) + len(failed),
         "failed": failed,
         **outcome.summary,
     }
 
 
-def _print(outcome: Outcome) -> None:
+def _print(outcome: Outcome, *, on_cluster: bool) -> None:
     from rich.console import Console
 
     console = Console(highlight=False)
@@ -74,9 +81,15 @@ def _print(outcome: Outcome) -> None:
         console.print(table)
     failed = outcome.failed
     for row in failed[:_REASONS]:
-        console.print(f"failed: {row['key']}: {row['reason']}", markup=False)
+        tries = f" ({row['tries']} times)" if row["tries"] > 1 else ""
+        where = f" (at {row['worker']})" if on_cluster and row["worker"] else ""
+        console.print(f"failed{tries}: {row['key']}: {row['reason']}{where}", markup=False)
     if len(failed) > _REASONS:
         console.print(f"and {len(failed) - _REASONS} more that failed")
-    console.print(
-        f"{len(outcome.rows)} tasks, {len(failed)} failed: {outcome.results}", soft_wrap=True
-    )
+    count = f"{len(outcome.rows) + len(failed)} tasks, {len(failed)} failed"
+    console.print(f"{count}: {outcome.results}", soft_wrap=True)
+    if failed:
+        console.print(
+            f"Every failure stands in {outcome.failures}; the same command tries them again.",
+            soft_wrap=True,
+        )

@@ -15,8 +15,10 @@ from distributed import Client, LocalCluster
 from cell.study.work import ready
 from drivers.errors import DeviceUnreachable
 
-# its tracebacks of lost links are no news: what they mean is told in words
-logging.getLogger("distributed").setLevel(logging.CRITICAL)
+# its tracebacks of lost links are no news: what they mean is told in words; its client's log has a
+# level of its own
+for _name in ("distributed", "distributed.client"):
+    logging.getLogger(_name).setLevel(logging.CRITICAL)
 
 REACH_S = 10.0
 _WORKER_S = 60.0

@@ -26,20 +26,21 @@ from cell.errors import InputError
 from cell.files.plan_file import read_plan
 from cell.files.study_file import read_study
 from cell.simulate import simulate_corners, with_truth
-from cell.study import cluster, extra
-from cell.study.folder import RESULTS, StudyFolder
+from cell.study import cluster, extra, run
+from cell.study.folder import FAILURES, MANIFEST, RESULTS, StudyFolder
 from cell.study.kinds import kind_of
 from cell.study.run import Outcome, run_study
 from cell.study.trial import truth_of
+from tests.study.killers import KILLER, kill_or_work
 from tests.study.studies import seeds, study, write_plan, write_study
 
 Said = tuple[int, str, str]
 Cell = Callable[..., Said]
 
 
-def rows_on_disk(folder: Path) -> list[dict[str, Any]]:
+def rows_on_disk(folder: Path, table: str = RESULTS) -> list[dict[str, Any]]:
     """As anybody would read them."""
-    rows: list[dict[str, Any]] = pq.read_table(folder / RESULTS).to_pylist()
+    rows: list[dict[str, Any]] = pq.read_table(folder / table).to_pylist()
     return rows
 
 
@@ -85,6 +86,25 @@ def test_a_worker_killed_in_the_middle_costs_nothing_but_its_task(tmp_path: Path
     assert sorted(row["key"] for row in rows) == [f"as it is/seed {k}" for k in range(4)]
     assert {row["status"] for row in rows} == {"done"}
     assert not outcome.failed
+
+
+def test_a_task_that_kills_its_workers_fails_and_all_others_are_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, folder = study(tmp_path, seeds(3)), tmp_path / "out"
+    monkeypatch.setattr(run, "work", kill_or_work)
+    # one worker has the killer and an innocent at once; a death each is enough to give up both
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
+        outcome = run_study(asked, folder, workers=1)
+    (failed,) = outcome.failed
+    assert failed["key"] == f"as it is/seed {KILLER}"
+    assert failed["reason"].startswith("it kills its workers: 1 died while nothing else ran, the")
+    assert [row["seed"] for row in outcome.rows] == [0, 2]
+    assert [row["key"] for row in rows_on_disk(folder, FAILURES)] == [failed["key"]]
+
+    monkeypatch.undo()
+    assert not run_study(asked, folder, workers=1).failed
+    assert sorted(row["seed"] for row in rows_on_disk(folder)) == [0, 1, 2]
 
 
 def test_ctrl_c_stops_with_status_4_and_the_rest_is_done_later(
@@ -207,42 +227,66 @@ def test_a_part_that_a_crash_left_is_dropped_and_none_is_overwritten(
     (copy / RESULTS / ".part-000009.parquet").write_bytes(b"PAR1 half")
     asked = read_study(path)
     with StudyFolder.opened(copy, asked, kind_of(asked).schema) as store:
-        rows = store.rows()
+        rows = store.done()
         store.add([{**rows[0], "key": "one more", "number": 99}])
-        assert len(store.rows()) == len(rows) + 1
+        assert len(store.done()) == len(rows) + 1
     last = sorted((copy / RESULTS).iterdir())[-1]
     last.write_bytes(last.read_bytes()[:-20])
     with pytest.raises(InputError, match=rf"{last.name}: is no whole Parquet file"):
         run_study(asked, copy)
 
 
-def test_a_task_that_fails_is_a_row_with_its_reason(
-    tmp_path: Path, scheduler: str, cell: Cell
-) -> None:
-    content = """\
-monte_carlo:
-  plan: small.plan.yaml
-  seeds: 1
-  cases:
-  - {name: as it is}
-  - {name: odd, effects: [{name: frame_pose_swap, parameters: {frames: 3}}]}
-"""
-    path, folder = write_study(tmp_path, content), tmp_path / "out"
-    status, out, err = cell("study", path, "-o", folder, "--scheduler", scheduler, "--json")
+def test_what_failed_is_told_and_tried_again(tmp_path: Path, scheduler: str, cell: Cell) -> None:
+    plan = read_plan(write_plan(tmp_path))
+    for name in ("good", "broken"):
+        simulate_corners(plan, tmp_path / "runs" / name)
+    frames = tmp_path / "runs" / "broken" / "frames.jsonl"
+    frames.rename(frames.with_suffix(".away"))
+    path = write_study(tmp_path, "recordings: {folders: ['runs/*'], verbs: [calibrate]}\n")
+    folder = tmp_path / "out"
+    words = ("study", path, "-o", folder, "--scheduler", scheduler)
+
+    status, out, err = cell(*words, "--json")
     assert (status, err) == (1, "")
     told = json.loads(out)
     assert told["tasks"] == 2
     (failed,) = told["failed"]
-    assert failed["key"] == "odd/seed 0"
-    assert failed["reason"].startswith("frame_pose_swap: frames must be even")
-    assert {row["key"]: row["status"] for row in rows_on_disk(folder)} == {
-        "as it is/seed 0": "done",
-        "odd/seed 0": "failed",
-    }
-    status, out, _ = cell("study", path, "-o", folder)
+    assert failed["key"].endswith("runs/broken")
+    assert "frames.jsonl: cannot be read" in failed["reason"]
+    assert failed["tries"] == 1
+    parts = {part: part.read_bytes() for part in folder.rglob("part-*")}
+    assert len(parts) == 2
+
+    status, out, err = cell(*words)
     assert status == 1
-    assert "failed: odd/seed 0: frame_pose_swap: frames must be even" in out
+    assert err == (
+        f"1 task that failed before will be tried again; the reasons stay in {folder / FAILURES}\n"
+    )
+    assert "failed (2 times): calibrate " in out
     assert "2 tasks, 1 failed" in out
+
+    frames.with_suffix(".away").rename(frames)
+    status, out, err = cell(*words)
+    assert status == 0
+    assert "2 tasks, 0 failed" in out
+    assert {part: part.read_bytes() for part in parts} == parts
+    done = rows_on_disk(folder)
+    assert sorted(Path(row["recording"]).name for row in done) == ["broken", "good"]
+    assert {row["status"] for row in done} == {"done"}
+    failures = rows_on_disk(folder, FAILURES)
+    assert [Path(row["recording"]).name for row in failures] == ["broken", "broken"]
+    status, _, err = cell(*words)
+    assert (status, err) == (0, "")
+
+
+def test_a_folder_of_another_version_is_refused(tmp_path: Path, finished: Finished) -> None:
+    path, folder, _ = finished
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    manifest = copy / MANIFEST
+    manifest.write_text(manifest.read_text().replace("study-results/2", "study-results/1"))
+    with pytest.raises(InputError, match=r"another version of this program \(cell.study-results/1"):
+        run_study(read_study(path), copy)
 
 
 def test_power_counts_what_the_diagnosis_names(tmp_path: Path, scheduler: str) -> None:
@@ -269,10 +313,11 @@ def test_recordings_of_a_folder(tmp_path: Path, scheduler: str) -> None:
     asked = study(tmp_path, "recordings: {folders: ['runs/*'], verbs: [calibrate, diagnose]}\n")
     outcome = run_study(asked, tmp_path / "out", scheduler=scheduler)
     rows = {(row["verb"], Path(row["recording"]).name): row for row in outcome.rows}
-    assert {key for key, row in rows.items() if row["status"] == "failed"} == {
+    assert {name for _, name in rows} == {"good"}
+    assert [(row["verb"], Path(row["recording"]).name) for row in outcome.failed] == [
         ("calibrate", "broken"),
         ("diagnose", "broken"),
-    }
+    ]
     assert all("frames.jsonl: cannot be read" in row["reason"] for row in outcome.failed)
     assert rows["diagnose", "good"]["verdict"] == "consistent"
     calibration = json.loads(rows["calibrate", "good"]["document"])
