@@ -39,13 +39,13 @@ def _agree(held: HeldOut) -> str:
 def _moved(found: CrossValidation) -> Iterator[str]:
     far, drifting = found.too_far, found.drifting
     if far:
-        told = _listed([f"{_the(m.quantity)} {m.factor:.1f} times" for m in far])
+        told = listed([f"{_the(m.quantity)} {m.factor:.1f} times" for m in far])
         yield (
             "Fits without a fifth of the frames each move farther than the stated uncertainty"
             f" allows: {told}; take these sigmas so many times as large."
         )
     if drifting:
-        names = _listed([_the(m.quantity) for m in drifting])
+        names = listed([_the(m.quantity) for m in drifting])
         yield (
             f"The move of {names} grows from the earliest frames to the latest: something drifts."
         )
@@ -82,5 +82,6 @@ def _the(quantity: str) -> str:
     return f"the {_WORDS[quantity]}"
 
 
-def _listed(words: Sequence[str]) -> str:
+def listed(words: Sequence[str]) -> str:
+    """Words as a sentence has them: a, b and c."""
     return " and ".join((", ".join(words[:-1]), words[-1])) if len(words) > 1 else words[0]

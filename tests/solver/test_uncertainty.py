@@ -14,15 +14,12 @@ from calib.calibration.uncertainty import (
     workpiece_sigma_m,
 )
 from calib.chain import rigid
-from calib.chain.effects import make_effect
-from calib.chain.model import CellModel
 from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
-from calib.solver.joint import JointFit, fit_joint
-from calib.solver.noise import Noise
-from calib.solver.unknowns import unknowns_of
+from calib.solver.joint import JointFit
 from calib.views import FloatArray, Mount, Views
 from cell.files.calibration_file import CalibrationFile
+from tests.calibration.fitted import K1, THIN_F_M, fit
 from tests.paper.scene import (
     ALPHA0,
     BASE_FROM_FIXED,
@@ -36,7 +33,6 @@ from tests.paper.scene import (
     mixed_scene,
 )
 
-THIN_F_M, K1 = 0.018, -0.05
 RUNS = 16
 PIXELS = np.array([[0.5, 0.5], [0.15, 0.2], [0.9, 0.75]]) * [WIDTH, HEIGHT]
 DISTANCES = np.array([0.35, 0.9])
@@ -49,10 +45,7 @@ def _fitted(seed: int, mount: Mount) -> tuple[JointFit, Views]:
         8, 12, noise_px=0.1, thin_f_m=THIN_F_M, k1=K1, robot_mm=0.05, robot_deg=0.005,
         mount=mount, seed=seed,
     ).views  # fmt: skip
-    optics = optics_row(alpha_px=ALPHA0, beta_px=BETA0, u0_px=U0, v0_px=V0, k1=K1, height_px=HEIGHT)
-    lens = make_effect("focus_breathing", {"law": "thin_lens", "f_m": THIN_F_M})
-    model = CellModel(optics, FLANGE_FROM_MOUNTED, BASE_FROM_FIXED, (lens,))
-    return fit_joint(model, views, unknowns_of(model), Noise(0.1, 5e-5, 9e-5)), views
+    return fit(views), views
 
 
 def _lens(optics: FloatArray, f_m: float, distance_m: float) -> FloatArray:
@@ -146,11 +139,7 @@ def test_more_views_make_it_smaller_and_the_corners_are_worse_than_the_middle() 
         mixed_scene(8, n, noise_px=0.1, thin_f_m=THIN_F_M, k1=K1, robot_mm=0.05, robot_deg=0.005)
         for n in (12, 48)
     )
-    maps = []
-    for views in (few.views, many.views):
-        model = _fitted(0, "eye_in_hand")[0].model
-        fit = fit_joint(model, views, unknowns_of(model), Noise(0.1, 5e-5, 9e-5))
-        maps.append(uncertainty_map(fit, views, (0.35, 0.9)))
+    maps = [uncertainty_map(fit(v), v, (0.35, 0.9)) for v in (few.views, many.views)]
     less, more = (m.workpiece_sigma_m for m in maps)
     assert 0.3 < np.median(more / less) < 0.85
     pixels = maps[0].projection_sigma_px

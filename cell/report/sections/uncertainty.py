@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from calib.calibration.verdict_words import listed
 from cell.report import html
 from cell.report.data import ReportData
 from cell.report.numbers import millimetres, number
@@ -37,7 +38,7 @@ def uncertainty_sentences(data: ReportData) -> Iterator[str]:
             f"{number(found['distance_m'][-1], 'm')} (one sigma, image's mean)."
         )
     for weak in calibration.get("not_separable") or ():
-        words = f"These views hardly tell apart {_listed(in_words(weak['quantities']))}"
+        words = f"These views hardly tell apart {listed(in_words(weak['quantities']))}"
         more = weak["separate_with"]
         helps = f"; {more}." if more.startswith("none") else f": record {more} as well."
         yield words + helps
@@ -128,15 +129,11 @@ def _not_separable(calibration: Mapping[str, Any]) -> str:
     head = ("hardly told apart", "times worse than each alone", "record as well",
             "four such views help")  # fmt: skip
     rows = [
-        (_listed(in_words(w["quantities"])), number(w["inflation"], "", 2), w["separate_with"],
+        (listed(in_words(w["quantities"])), number(w["inflation"], "", 2), w["separate_with"],
          f"{number(w['gain'], '', 2)} times")
         for w in found
     ]  # fmt: skip
     return html.table(head, rows, "What the views see nearly only together")
-
-
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join((", ".join(names[:-1]), names[-1])) if len(names) > 1 else names[0]
 
 
 def _rms(values: Any) -> float:
