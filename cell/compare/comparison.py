@@ -126,6 +126,12 @@ def _notes(a: Side, b: Side, mounted: Difference | None) -> tuple[str, ...]:
         for side in (a, b)
         if not side.correlated
     ]
+    notes += [
+        f"{side.label}: its own frames ask for up to {side.too_sure:.1f} times the uncertainty it"
+        " states (cross-validation): chance makes more than is told here"
+        for side in (a, b)
+        if side.too_sure > 1.0
+    ]
     if mounted is None:
         notes.append("the cameras' places on the robot are not both known: not compared")
     notes += [

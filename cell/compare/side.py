@@ -56,6 +56,8 @@ class Side:
         `flange_from_camera` or `base_from_camera` and its (4, 4); empty and None where unknown.
     has_corner:
         True where the scale factors have a corner that no smooth law has.
+    too_sure:
+        How many times the stated sigmas its cross-validation asks for; one where it does not.
     """
 
     label: str
@@ -70,6 +72,7 @@ class Side:
     place_name: str
     place: FloatArray | None
     has_corner: bool
+    too_sure: float
 
     @property
     def knows_chance(self) -> bool:
@@ -118,6 +121,7 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
             " version. Run cell calibrate anew"
         )
     name, zones = calibration.recommended(), calibration.zones
+    checked = calibration.cross_validation
     solution, law = calibration.solution(name), moving_law(calibration, name)
     place_name = next((n for n in _PLACES if getattr(calibration, n) is not None), "")
     place: TransformSource | None = getattr(calibration, place_name) if place_name else None
@@ -135,6 +139,7 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
         place_name=place_name,
         place=None if place is None else place.matrix,
         has_corner=law is not None and zones is not None and zones.method == "change_point",
+        too_sure=1.0 if checked is None else checked.factor,
     )
 
 

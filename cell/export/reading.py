@@ -138,6 +138,13 @@ class RobotSource(_Part):
     corner_sigma_px: PositiveFloat
 
 
+class CrossValidationSource(_Part):
+    """Whether other frames would have given the same."""
+
+    factor: PositiveFloat = 1.0
+    """How many times the stated sigmas the frames ask for."""
+
+
 class CalibrationSource(_Part):
     """What a reader of `calibration.json` relies on."""
 
@@ -154,6 +161,7 @@ class CalibrationSource(_Part):
     flange_from_board: TransformSource | None = None
     base_from_camera: TransformSource | None = None
     robot: RobotSource | None = None
+    cross_validation: CrossValidationSource | None = None
 
     @property
     def range_m(self) -> tuple[float, float] | None:

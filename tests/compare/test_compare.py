@@ -129,6 +129,15 @@ def test_without_covariances_it_says_that_chance_is_a_guess() -> None:
     assert found.camera.beyond_chance is False
 
 
+def test_an_uncertainty_that_its_own_frames_call_too_small_is_told() -> None:
+    sure = replace(_calibrated(1), label="new", too_sure=2.6)
+    notes = " ".join(compare(_calibrated(1), sure).notes)
+    assert "new: its own frames ask for up to 2.6 times the uncertainty it states" in notes
+    assert not any("own frames" in n for n in compare(_calibrated(1), _calibrated(2)).notes)
+    told = STILL | {"cross_validation": {"verdict": "sigma_too_small", "factor": 2.6}}
+    assert _side(told).too_sure == 2.6
+
+
 def test_without_any_uncertainty_it_does_not_judge() -> None:
     found = compare(_side(MOVING), _side(with_joint(MOVING, u0_px=2055.0)))
     assert found.camera.beyond_chance is None
