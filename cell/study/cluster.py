@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import logging
 import os
+import platform
 import signal
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from multiprocessing import resource_tracker
 
 import dask
 from distributed import Client, LocalCluster
 
-from cell.study.work import ready
 from drivers.errors import DeviceUnreachable
 
 # its tracebacks of lost links are no news: what they mean is told in words; its client's log has a
@@ -20,6 +22,7 @@ from drivers.errors import DeviceUnreachable
 for _name in ("distributed", "distributed.client"):
     logging.getLogger(_name).setLevel(logging.CRITICAL)
 
+PACKAGE = "calibration-cell"
 REACH_S = 10.0
 _WORKER_S = 60.0
 _SETTINGS = {
@@ -97,6 +100,7 @@ def _signals_for_us_alone() -> Iterator[None]:
 
 
 def _check(client: Client, scheduler: str) -> None:
+    """Make sure that workers are there and have this program."""
     try:
         client.wait_for_workers(1, timeout=_WORKER_S)
     except TimeoutError:
@@ -104,12 +108,51 @@ def _check(client: Client, scheduler: str) -> None:
             f"--scheduler {scheduler}: has no workers; start `dask worker {scheduler}` where they"
             " shall work"
         ) from None
-    try:
-        theirs = client.submit(ready, pure=False).result(timeout=_WORKER_S)
-    except Exception as error:
-        theirs = f"{type(error).__name__}: {error}"
-    if theirs != ready():
+    here, told = version(PACKAGE), _versions(client)
+    for who, theirs in told.items():
+        if theirs != here:
+            raise DeviceUnreachable(
+                f"--scheduler {scheduler}: scheduler and workers need {PACKAGE}[study] {here}, as"
+                f" here; {who} has: {theirs}"
+            )
+    if len(told) == 1:
         raise DeviceUnreachable(
-            f"--scheduler {scheduler}: its workers need calibration-cell[study] {ready()}, as here;"
-            f" theirs: {theirs}"
+            f"--scheduler {scheduler}: none of its workers answered in {_WORKER_S:.0f} s: all at"
+            f" other work, or their Python or `distributed` differ from {_dask_here()} here"
         )
+
+
+def _dask_here() -> str:
+    return f"{platform.python_version()} and {version('distributed')}"
+
+
+def _versions(client: Client) -> dict[str, str]:
+    """The version of this program at the scheduler and by worker; who does not answer is left out.
+
+    The scheduler unpacks what it passes on, and needs it as well.
+    """
+
+    # sent as it stands, being local: a worker that cannot import what it is sent dies of it
+    def theirs(package: str) -> str:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            return version(package)
+        except PackageNotFoundError:
+            return "none"
+
+    asked = {
+        worker: client.submit(theirs, PACKAGE, workers=[worker], pure=False)
+        for worker in client.nthreads()
+    }
+    until = time.monotonic() + _WORKER_S
+    told = {"the scheduler": client.run_on_scheduler(theirs, PACKAGE)}
+    for worker, future in asked.items():
+        try:
+            told[worker] = future.result(timeout=max(until - time.monotonic(), 0.1))
+        except TimeoutError:
+            pass
+        except Exception as error:
+            told[worker] = f"failed: {type(error).__name__}: {error}"
+    client.cancel(list(asked.values()))
+    return told

@@ -6,7 +6,6 @@ import os
 import socket
 import time
 import traceback
-from importlib.metadata import version
 
 from calib.errors import CalibrationError
 from cell.errors import exit_status_of
@@ -32,11 +31,6 @@ def work(study: Study, task: Task) -> Row:
     row["cpu_s"] = time.process_time() - begun
     row["worker"] = f"{socket.gethostname()}:{os.getpid()}"
     return row
-
-
-def ready() -> str:
-    """The version of this program where this runs."""
-    return version("calibration-cell")
 
 
 def lost(task: Task, reason: str) -> Row:

@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -339,6 +339,19 @@ def test_a_scheduler_that_is_not_there(
         assert err.count("\n") == 1
 
 
+def test_a_cluster_with_another_version_is_refused(
+    tmp_path: Path, scheduler: str, cell: Cell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "version", lambda name: "9.9")
+    path = write_study(tmp_path, seeds(1))
+    status, _, err = cell("study", path, "-o", tmp_path / "out", "--scheduler", scheduler)
+    assert status == 3
+    assert err == (
+        f"error: --scheduler {scheduler}: scheduler and workers need calibration-cell[study] 9.9,"
+        f" as here; the scheduler has: {version('calibration-cell')}\n"
+    )
+
+
 @pytest.mark.parametrize("name", extra.PACKAGES)
 def test_without_the_extra_it_says_how_to_install_it(
     tmp_path: Path, cell: Cell, monkeypatch: pytest.MonkeyPatch, name: str
@@ -353,12 +366,12 @@ def test_without_the_extra_it_says_how_to_install_it(
 def test_the_doctor_names_what_is_missing_and_does_not_mind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def version(name: str) -> str:
+    def installed(name: str) -> str:
         if name in extra.PACKAGES:
             raise PackageNotFoundError(name)
         return "1.0"
 
-    monkeypatch.setattr(import_module("cell.doctor.installed"), "version", version)
+    monkeypatch.setattr(import_module("cell.doctor.installed"), "version", installed)
     told = {finding.name: finding for finding in examine(None)}
     for name in extra.PACKAGES:
         assert not told[name].ready
