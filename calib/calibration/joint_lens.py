@@ -162,4 +162,4 @@ def with_deserved_terms(joint: JointFit, views: Views) -> JointFit:
     if not terms:
         return joint
     unknowns = unknowns_of(joint.model, PLAIN_OPTICS + terms)
-    return fit_joint(joint.model, views, unknowns, joint.noise, flange_error=joint.flange_error)
+    return fit_joint(joint.model, views, unknowns, joint.noise, own_error=joint.own_error)

@@ -70,26 +70,49 @@ def start(model: CellModel, views: Views, kinematics: ArmKinematics | None) -> W
     )
 
 
-Stop = int | Literal["arm", "place"]
+Stop = int | Literal["arm", "place", "focus"]
 """A place on the walk's way: an effect by its index, or what the chain itself does there."""
 
 
 def route(model: CellModel) -> tuple[Stop, ...]:
-    """The stops of a walk in their order: effects by link, the arm after its own, then the pose."""
+    """The stops of a walk in their order: effects by link, the arm after its own, then the pose.
+
+    The focal length's own error comes last: it is about what the lens does, whatever that is.
+    """
 
     def of(links: tuple[Link, ...]) -> list[int]:
         return [at for link in links for at, p in enumerate(model.effects) if p.effect.link == link]
 
-    return (*of(LINKS[:2]), "arm", *of(LINKS[2:4]), "place", *of(LINKS[4:]))
+    return (*of(LINKS[:2]), "arm", *of(LINKS[2:4]), "place", *of(LINKS[4:]), "focus")
 
 
-def _call_at(walk: Walk, stop: Stop, model: CellModel, flange_error: FloatArray | None) -> None:
+@dataclass(frozen=True)
+class Errors:
+    """What scatters frame by frame about what the chain says; None where nothing does.
+
+    Attributes
+    ----------
+    flange:
+        (N, 6) small increment of the flange in its own frame, metres and radians.
+    focal:
+        (N,) error of the focal length as a share of it.
+    """
+
+    flange: FloatArray | None = None
+    focal: FloatArray | None = None
+
+
+def _call_at(walk: Walk, stop: Stop, model: CellModel, errors: Errors) -> None:
     if stop == "place":
         walk.place()
+    elif stop == "focus":
+        if errors.focal is not None:
+            for name in ("alpha_px", "beta_px"):
+                walk.column(name)[:] *= 1.0 + errors.focal
     elif stop == "arm":
         walk.move_arm()
-        if flange_error is not None:
-            error = rigid.from_vector(flange_error)
+        if errors.flange is not None:
+            error = rigid.from_vector(errors.flange)
             walk.base_from_flange = rigid.product(walk.base_from_flange, error)
     else:
         present = model.effects[stop]
@@ -118,14 +141,15 @@ class Journey:
         *,
         kinematics: ArmKinematics | None = None,
         flange_error: FloatArray | None = None,
+        focal_error: FloatArray | None = None,
     ) -> None:
         self.state = start(model, views, kinematics or kinematics_of(views))
         self._model, self._route = model, route(model)
-        self._flange_error = flange_error
+        self._errors = Errors(flange_error, focal_error)
         self._before: list[Walk] = []
         for stop in self._route:
             self._before.append(self.state.copy())
-            _call_at(self.state, stop, model, flange_error)
+            _call_at(self.state, stop, model, self._errors)
         self._before.append(self.state)
         self.placed = self._route.index("place") + 1
         ahead = any(present.effect.looks_ahead for present in model.effects)
@@ -158,7 +182,7 @@ class Journey:
 
     def _on(self, state: Walk, model: CellModel, first: int) -> Walk:
         for stop in self._route[first:]:
-            _call_at(state, stop, model, self._flange_error)
+            _call_at(state, stop, model, self._errors)
         return state
 
 
@@ -168,6 +192,7 @@ def walk(
     *,
     kinematics: ArmKinematics | None = None,
     flange_error: FloatArray | None = None,
+    focal_error: FloatArray | None = None,
 ) -> Walk:
     """Walk the chain for every logged frame.
 
@@ -180,6 +205,8 @@ def walk(
     flange_error:
         (N, 6) small increment of the flange in its own frame, metres and radians: the robot's
         repeatability, or an estimate of it.
+    focal_error:
+        (N,) error of the focal length as a share of it.
 
     Returns
     -------
@@ -187,7 +214,7 @@ def walk(
     """
     state = start(model, views, kinematics or kinematics_of(views))
     for stop in route(model):
-        _call_at(state, stop, model, flange_error)
+        _call_at(state, stop, model, Errors(flange_error, focal_error))
     return state
 
 

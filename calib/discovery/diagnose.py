@@ -27,10 +27,11 @@ from calib.discovery.leftover import Leftover, look_for_leftover
 from calib.discovery.locate import Cell, locate
 from calib.discovery.pictures import fit_blur, told_of
 from calib.discovery.prove import held_out, prediction_rms_px, prove
+from calib.discovery.scatter import scattered
 from calib.discovery.search import Search
 from calib.discovery.split import split_misfit
 from calib.discovery.start import Fitter, fit_start
-from calib.solver.joint import JointFit
+from calib.solver.joint import JointFit, walked
 from calib.solver.noise import Noise, profile
 from calib.views import BoolArray, Views
 
@@ -65,12 +66,25 @@ def diagnose(
     before = fit_start(fitter, books.free, ~held)
     search = Search(before, fitter, branch_price)
     if forced is None:
-        search.run()
-        leftover = look_for_leftover(search)
+        leftover = _searched(search, before)
     else:
         search.force(forced)
         leftover = Leftover(search, ())
     return _told(books, held, before, leftover)
+
+
+def _searched(search: Search, before: JointFit) -> Leftover:
+    """Search; and once more with a focal length that scatters by chance, where it does."""
+    search.run()
+    leftover = look_for_leftover(search)
+    scatter = scattered(leftover)
+    if scatter is None:
+        return leftover
+    noise = replace(before.noise, focal=scatter.relative)
+    start = search.fitter.fit(before.model, noise, before.own_error)
+    again = Search(start, search.fitter, search.branch_price)
+    again.run()
+    return look_for_leftover(again, (scatter.cell,))
 
 
 def _with_branches(books: Books) -> tuple[Books, float]:
@@ -129,9 +143,9 @@ def _told(books: Books, held: BoolArray, before: JointFit, leftover: Leftover) -
 
 def _restarted(fit: JointFit, frames: int, held: BoolArray) -> JointFit:
     """The fit with room for the frames that were held out."""
-    error = np.zeros((frames, 6))
-    error[~held] = fit.flange_error
-    return replace(fit, flange_error=error)
+    error = np.zeros((frames, fit.own_error.shape[1]))
+    error[~held] = fit.own_error
+    return replace(fit, own_error=error)
 
 
 def _verdict(named: Sequence[NamedEffect], leftover: Leftover) -> Verdict:
@@ -234,6 +248,7 @@ def _judge(before: Noise, after: Noise) -> Noise:
         min(before.flange_m, after.flange_m),
         min(before.flange_rad, after.flange_rad),
         after.print_m if before.print_m > 0.0 else 0.0,
+        after.focal,
     )
 
 
@@ -244,7 +259,7 @@ def _excess(fit: JointFit) -> float:
 
 
 def _pictures(twin: JointFit, views: Views) -> tuple[str, ...]:
-    state = walk(twin.model, views, flange_error=twin.flange_error)
+    state = walk(twin.model, views, **walked(twin.own_error))
     return told_of(fit_blur(views.blur_px, state.distance_m))
 
 

@@ -46,8 +46,11 @@ def is_shape_of_law(cell: Cell, search: Search) -> bool:
     )
 
 
-def look_for_leftover(search: Search) -> Leftover:
-    """Test what is left; carry it by unnamed curves and see which names are still needed then."""
+def look_for_leftover(search: Search, known: tuple[Cell, ...] = ()) -> Leftover:
+    """Test what is left; carry it by unnamed curves and see which names are still needed then.
+
+    `known` is what is known to be left already.
+    """
     found: list[Cell] = []
     views = search.views
     for _ in range(_MOST_CURVES):
@@ -63,7 +66,7 @@ def look_for_leftover(search: Search) -> Leftover:
             break
     search.drop_on_joints({cell.site for cell in found})
     search.drop_beside_curves()
-    return Leftover(search, tuple(found))
+    return Leftover(search, known + tuple(found))
 
 
 def _carry(search: Search, cell: Cell, views: Views) -> bool:

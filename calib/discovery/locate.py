@@ -7,7 +7,7 @@ for periods, and the image and the board for a field of shifts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,8 +26,8 @@ from calib.chain.model import walk
 from calib.chain.walk import Walk
 from calib.discovery.fields import field_scores
 from calib.discovery.score import Score, conditional, extended, group_score
-from calib.solver.joint import JointFit, assemble
-from calib.solver.unknowns import Dependence, amounts, prior_information
+from calib.solver.joint import JointFit, assemble, walked
+from calib.solver.unknowns import amounts, prior_information
 from calib.views import FloatArray, Views
 
 _PERIODS = 240
@@ -68,7 +68,7 @@ class Cell:
 
 def locate(fit: JointFit, views: Views) -> list[Cell]:
     """Test every site against every covariate; the most significant first."""
-    state = walk(fit.model, views, flange_error=fit.flange_error)
+    state = walk(fit.model, views, **walked(fit.own_error))
     probe = _Probe(fit, views, state)
     cells = [cell for covariate in COVARIATES for cell in probe.along(covariate)]
     cells += probe.periods()
@@ -98,14 +98,12 @@ class _Probe:
         n, q, e = columns.shape
         product = (columns[:, :, None, :] * functions[:, None, :, None]).reshape(n, q, -1)
         local = np.concatenate([self.found.local[:, :, : self.base], product], axis=2)
-        found = Dependence(
-            self.found.state, self.found.active, self.found.modes, local, self.found.flange
-        )
+        found = replace(self.found, local=local)
         shift = self.fit.equations.corner_shift if self.fit.equations.corner_numbers else None
         free = np.zeros(local.shape[2] - self.base)
         prior = (np.append(self.amount, free), np.append(self.information, free))
         equations, _ = assemble(
-            found, self.views, self.fit.weight, self.fit.flange_error, shift, prior
+            found, self.views, self.fit.weight, self.fit.own_error, shift, prior
         )
         b = functions.shape[1]
         information, score = conditional(equations, self.fit, self.base + np.arange(b * e))

@@ -50,18 +50,21 @@ class Floor:
 
 def floor_of(model: CellModel, views: Views, noise: Noise) -> Floor:
     """Prediction error that noise alone makes on these frames, and how likely they are."""
-    found = dependence(model, views, (), kinematics=kinematics_of(views), flange_error=None)
+    focal = np.zeros(len(views)) if noise.focal > 0.0 else None
+    found = dependence(
+        model, views, (), kinematics=kinematics_of(views), flange_error=None, focal_error=focal
+    )
     state = found.state
     pixels, j_pose, j_optics = project_with_jacobians(
         state.optics, state.camera_from_board, state.points_m
     )
     columns = np.concatenate([j_optics[..., list(found.active)], j_pose], axis=-1)
-    jacobian = columns @ found.flange[:, None]
-    spread = np.linalg.inv(noise.flange_information)
+    jacobian = columns @ found.own[:, None]
+    spread = np.linalg.inv(noise.own_information)
     square, nll = [], 0.0
     for i in range(len(views)):
         seen = views.seen[i]
-        j = jacobian[i, seen].reshape(-1, 6)
+        j = jacobian[i, seen].reshape(-1, len(spread))
         covariance = j @ spread @ j.T + noise.corner_px**2 * np.eye(len(j))
         miss = (views.corners_px[i, seen] - pixels[i, seen]).ravel()
         _, log_det = np.linalg.slogdet(covariance)

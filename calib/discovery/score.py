@@ -17,7 +17,7 @@ from scipy.stats import f as f_distribution
 from calib.chain.effect import Present
 from calib.chain.model import kinematics_of
 from calib.solver.elimination import solve_scaled
-from calib.solver.joint import JointFit, assemble
+from calib.solver.joint import JointFit, assemble, walked
 from calib.solver.noise import JointEquations, scaled
 from calib.solver.unknowns import (
     Dependence,
@@ -113,11 +113,11 @@ def extended(
     amounts = amount_unknowns(model, fit.unknowns)
     unknowns = (*fit.unknowns, *amounts)
     found = dependence(
-        model, views, unknowns, kinematics=kinematics_of(views), flange_error=fit.flange_error
+        model, views, unknowns, kinematics=kinematics_of(views), **walked(fit.own_error)
     )
     shift = fit.equations.corner_shift if fit.equations.corner_numbers else None
     prior = (amounts_of(model, unknowns), prior_information(unknowns))
-    equations, _ = assemble(found, views, fit.weight, fit.flange_error, shift, prior)
+    equations, _ = assemble(found, views, fit.weight, fit.own_error, shift, prior)
     return equations, found, unknowns, base
 
 

@@ -92,15 +92,13 @@ class Fitter:
         self,
         model: CellModel,
         noise: Noise,
-        flange_error: FloatArray | None = None,
+        own_error: FloatArray | None = None,
         weight: FloatArray | None = None,
     ) -> JointFit:
         """Fit the cell, with whatever effects it has; the corners' weights too if not given."""
         if self.has_robot:
             unknowns = unknowns_of(model)
-            return fit_joint(
-                model, self.views, unknowns, noise, flange_error=flange_error, weight=weight
-            )
+            return fit_joint(model, self.views, unknowns, noise, own_error=own_error, weight=weight)
         unheard = replace(noise, flange_m=UNKNOWN_POSE[0], flange_rad=UNKNOWN_POSE[1])
         unknowns = unknowns_of(model, poses=False)
         return fit_joint(
@@ -108,7 +106,7 @@ class Fitter:
             self.views,
             unknowns,
             unheard,
-            flange_error=flange_error,
+            own_error=own_error,
             fixed_noise=True,
             weight=weight,
         )
@@ -116,11 +114,11 @@ class Fitter:
     def with_effects(self, start: JointFit, effects: Sequence[Present]) -> JointFit:
         """Fit a cell with these effects from where another fit stands, corners weighted alike."""
         model = start.model.with_effects(effects)
-        return self.fit(model, start.noise, start.flange_error, start.weight)
+        return self.fit(model, start.noise, start.own_error, start.weight)
 
     def settled(self, start: JointFit) -> JointFit:
         """Fit the same cell with the corners' weights estimated anew."""
-        return self.fit(start.model, start.noise, start.flange_error)
+        return self.fit(start.model, start.noise, start.own_error)
 
 
 _PRINT_WORTH = 10.0
@@ -154,6 +152,6 @@ def fit_start(fitter: Fitter, free: FreeViews, train: BoolArray) -> JointFit:
     if not fitter.has_robot or views.board.corner_count > _MOST_FREE_CORNERS:
         return fit
     guess = replace(fit.noise, print_m=_PRINT_GUESS_M)
-    freed = fitter.fit(fit.model, guess, fit.flange_error, fit.weight)
+    freed = fitter.fit(fit.model, guess, fit.own_error, fit.weight)
     better = freed.minus_two_log < fit.minus_two_log - _PRINT_WORTH
     return fitter.settled(freed) if better else fit

@@ -79,11 +79,11 @@ def each_frame(
     mapping[:, :q, :p] = found.local
     mapping[:, -1, -1] = 1.0
     mapped = local.gram @ mapping
-    flange_t = np.swapaxes(found.flange, 1, 2)
-    followed = found.flange.shape[1]
+    own_t = np.swapaxes(found.own, 1, 2)
+    followed = found.own.shape[1]
     return EachFrame(
-        own=flange_t @ local.gram[:, :followed, :followed] @ found.flange,
-        cross=flange_t @ mapped[:, :followed],
+        own=own_t @ local.gram[:, :followed, :followed] @ found.own,
+        cross=own_t @ mapped[:, :followed],
         shared=np.swapaxes(mapping, 1, 2) @ mapped,
         flange_error=flange_error,
     )

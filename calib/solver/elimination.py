@@ -1,8 +1,8 @@
 """Per-frame unknowns eliminated: what is left are the shared ones.
 
-Each frame contributes normal equations in six of its own numbers and the p shared ones; the
-Schur complement takes the six out (Triggs et al. 2000, Bundle adjustment, section 6.1). With a
-prior on the six this is the marginal likelihood of a linear mixed model: a noisy robot pose is
+Each frame contributes normal equations in some numbers of its own and the p shared ones; the
+Schur complement takes its own out (Triggs et al. 2000, Bundle adjustment, section 6.1). With a
+prior on them this is the marginal likelihood of a linear mixed model: a noisy robot pose is
 nothing else.
 """
 
@@ -22,12 +22,14 @@ UNDETERMINED = 1e-10
 
 @dataclass(frozen=True)
 class FrameEquations:
-    """Normal equations of N frames in their own 6 numbers, p shared ones and the residual.
+    """Normal equations of N frames in their own F numbers, p shared ones and the residual.
+
+    The own numbers are six of a pose, and a seventh where something else scatters frame by frame.
 
     Attributes
     ----------
     own, own_shared, own_residual:
-        (N, 6, 6), (N, 6, p), (N, 6).
+        (N, F, F), (N, F, p), (N, F).
     shared, shared_residual:
         (p, p) and (p,), summed over the frames.
     square_sum:
@@ -42,7 +44,7 @@ class FrameEquations:
     square_sum: float
 
 
-def gathered(parts: Sequence[FrameEquations]) -> FrameEquations:
+def joined(parts: Sequence[FrameEquations]) -> FrameEquations:
     """The equations of all frames from those of consecutive blocks of them."""
     return FrameEquations(
         own=np.concatenate([part.own for part in parts]),
@@ -65,9 +67,9 @@ class Reduced:
     log_det_own:
         Sum over frames of the log-determinants of the eliminated blocks.
     back, at_zero:
-        (N, 6, p) and (N, 6): own = at_zero - back @ shared.
+        (N, F, p) and (N, F): own = at_zero - back @ shared.
     own_covariance:
-        (N, 6, 6) inverse of the eliminated blocks.
+        (N, F, F) inverse of the eliminated blocks.
     """
 
     shared: FloatArray
@@ -87,21 +89,21 @@ def eliminate(equations: FrameEquations, prior: FloatArray, damping: float = 0.0
     equations:
         See `FrameEquations`.
     prior:
-        (6, 6) or (N, 6, 6) information of the own numbers, added to their blocks.
+        (F, F) or (N, F, F) information of the own numbers, added to their blocks.
     damping:
         Levenberg-Marquardt factor on the own blocks' diagonals.
     """
     own = equations.own + prior
     if damping:
-        own = own + damping * own * np.eye(6)
+        own = own + damping * own * np.eye(own.shape[1])
     scale = 1.0 / np.sqrt(np.maximum(np.einsum("nii->ni", own), 1e-300))
     normal = own * scale[:, :, None] * scale[:, None, :]
     covariance = np.linalg.inv(normal) * scale[:, :, None] * scale[:, None, :]
     back = covariance @ equations.own_shared
     at_zero = np.einsum("nij,nj->ni", covariance, equations.own_residual)
-    n, six, p = equations.own_shared.shape
-    gathered = equations.own_shared.reshape(n * six, p)
-    shared = equations.shared - gathered.T @ back.reshape(n * six, p)
+    n, f, p = equations.own_shared.shape
+    gathered = equations.own_shared.reshape(n * f, p)
+    shared = equations.shared - gathered.T @ back.reshape(n * f, p)
     shared_residual = equations.shared_residual - gathered.T @ at_zero.reshape(-1)
     _, log_det = np.linalg.slogdet(normal)
     return Reduced(

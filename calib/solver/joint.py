@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypedDict
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from calib.chain.kinematics import ArmKinematics
 from calib.chain.model import CellModel, kinematics_of, walk
 from calib.chain.projection import project
 from calib.solver.accumulate import LocalEquations, local_equations
-from calib.solver.elimination import FrameEquations, gathered, solve_scaled
+from calib.solver.elimination import FrameEquations, joined, solve_scaled
 from calib.solver.noise import JointEquations, Noise, Profile, estimate_noise, profile, scaled
 from calib.solver.unknowns import (
     Dependence,
@@ -32,12 +33,28 @@ BLOCK_FRAMES = 64
 """Frames whose products are at hand together: they stay in the cache, and memory stays small."""
 
 
+class Walked(TypedDict):
+    """A frame's own errors as the walk takes them."""
+
+    flange_error: FloatArray
+    focal_error: FloatArray | None
+
+
+def walked(own_error: FloatArray) -> Walked:
+    """(N, 6) errors of the flange, or (N, 7) with that of the focal length, for the walk."""
+    focal = own_error[:, 6] if own_error.shape[1] > 6 else None
+    return {"flange_error": own_error[:, :6], "focal_error": focal}
+
+
 @dataclass(frozen=True)
 class JointState:
-    """Where the fit stands: the cell, each flange's error, and the noise."""
+    """Where the fit stands: the cell, each frame's own errors, and the noise.
+
+    (N, 6) errors of the flange; (N, 7) with that of the focal length where it scatters.
+    """
 
     model: CellModel
-    flange_error: FloatArray
+    own_error: FloatArray
     noise: Noise
 
 
@@ -47,8 +64,8 @@ class JointFit:
 
     Attributes
     ----------
-    model, noise, flange_error:
-        The cell, the noise levels, and (N, 6) the flange's errors in its own frame.
+    model, noise, own_error:
+        The cell, the noise levels, and each frame's errors, see `JointState`.
     unknowns, covariance:
         The p free numbers and their (p, p) covariance.
     residual_px:
@@ -63,7 +80,7 @@ class JointFit:
 
     model: CellModel
     noise: Noise
-    flange_error: FloatArray
+    own_error: FloatArray
     unknowns: tuple[Unknown, ...]
     covariance: FloatArray
     residual_px: FloatArray
@@ -73,6 +90,11 @@ class JointFit:
     equations: JointEquations
     dependence: Dependence
     converged: bool
+
+    @property
+    def flange_error(self) -> FloatArray:
+        """(N, 6) the flange's errors in its own frame."""
+        return self.own_error[:, :6]
 
     @property
     def parameters(self) -> int:
@@ -87,7 +109,7 @@ class JointFit:
 
 def _with_corners(
     local: LocalEquations,
-    flange: FloatArray,
+    own: FloatArray,
     mapping: FloatArray,
     equations: FrameEquations,
 ) -> FrameEquations:
@@ -96,8 +118,8 @@ def _with_corners(
     assert local.own is not None
     n, m = local.own.shape[:2]
     cross = local.cross.reshape(n, 2 * m, -1)
-    followed, p = flange.shape[1], mapping.shape[2]
-    own_corner = np.einsum("nqk,ncq->nkc", flange, cross[:, :, :followed])
+    followed, p = own.shape[1], mapping.shape[2]
+    own_corner = np.einsum("nqk,ncq->nkc", own, cross[:, :, :followed])
     shared_corner = np.einsum("ncq,nqp->pc", cross[:, :, :-1], mapping, optimize=True)
     shared = np.zeros((p + 2 * m, p + 2 * m))
     shared[:p, :p] = equations.shared
@@ -119,33 +141,33 @@ def _with_corners(
 
 
 def _in_shared_numbers(
-    local: LocalEquations, flange: FloatArray, mapping: FloatArray
+    local: LocalEquations, own: FloatArray, mapping: FloatArray
 ) -> FrameEquations:
-    """A block's equations in flange errors and shared numbers."""
-    gram, followed = local.gram, flange.shape[1]
-    flange_t = np.swapaxes(flange, 1, 2)
+    """A block's equations in its frames' own numbers and the shared ones."""
+    gram, followed = local.gram, own.shape[1]
+    own_t = np.swapaxes(own, 1, 2)
     mapped = gram[:, :-1, :-1] @ mapping
     n, q, p = mapping.shape
     frames = FrameEquations(
-        own=flange_t @ gram[:, :followed, :followed] @ flange,
-        own_shared=flange_t @ mapped[:, :followed],
-        own_residual=(flange_t @ gram[:, :followed, -1:])[:, :, 0],
+        own=own_t @ gram[:, :followed, :followed] @ own,
+        own_shared=own_t @ mapped[:, :followed],
+        own_residual=(own_t @ gram[:, :followed, -1:])[:, :, 0],
         shared=mapping.reshape(n * q, p).T @ mapped.reshape(n * q, p),
         shared_residual=np.einsum("nqi,nq->i", mapping, gram[:, :-1, -1]),
         square_sum=float(gram[:, -1, -1].sum()),
     )
-    return frames if local.own is None else _with_corners(local, flange, mapping, frames)
+    return frames if local.own is None else _with_corners(local, own, mapping, frames)
 
 
 def assemble(
     found: Dependence,
     views: Views,
     weight: FloatArray,
-    flange_error: FloatArray,
+    own_error: FloatArray,
     corner_shift: FloatArray | None,
     prior: tuple[FloatArray, FloatArray],
 ) -> tuple[JointEquations, FloatArray]:
-    """Normal equations in flange errors and shared numbers; and (N, M, 2) residuals.
+    """Normal equations in the frames' own errors and shared numbers; and (N, M, 2) residuals.
 
     `prior` has how far the p shared numbers are from the centres of their priors, and the inverse
     variances of these.
@@ -166,11 +188,10 @@ def assemble(
             corners=corner_shift is not None,
         )
         residual[block] = local.residual_px
-        flange, mapping = found.flange[block], found.local[block]
-        parts.append(_in_shared_numbers(local, flange, mapping))
+        parts.append(_in_shared_numbers(local, found.own[block], found.local[block]))
     equations = JointEquations(
-        frames=gathered(parts),
-        flange_error=flange_error,
+        frames=joined(parts),
+        own_error=own_error,
         corner_shift=np.zeros(0) if corner_shift is None else corner_shift,
         amount=prior[0],
         amount_information=prior[1],
@@ -218,23 +239,23 @@ class _Iteration:
             self.views,
             self.unknowns,
             kinematics=self.arm,
-            flange_error=self.state.flange_error,
+            **walked(self.state.own_error),
         )
         self.equations, self.residual = self._assemble(self.found, self.state)
 
     def _assemble(self, found: Dependence, at: JointState) -> tuple[JointEquations, FloatArray]:
         shift = _shift_of(at.model, self.views) if self.with_print else None
         prior = (amounts(at.model, self.unknowns, self.about), self.information)
-        return assemble(found, self.views, self.weight, at.flange_error, shift, prior)
+        return assemble(found, self.views, self.weight, at.own_error, shift, prior)
 
     def cost(self, at: JointState) -> float:
         """Penalised square sum at that state, for the present weights."""
-        seen = walk(at.model, self.views, kinematics=self.arm, flange_error=at.flange_error)
+        seen = walk(at.model, self.views, kinematics=self.arm, **walked(at.own_error))
         pixels = project(seen.optics, seen.camera_from_board, seen.points_m)
         square = np.nansum((self.views.corners_px - pixels) ** 2, axis=2)
         cost = float(np.sum(self.weight * square)) / at.noise.corner_px**2
-        pull = at.flange_error @ at.noise.flange_information
-        cost += float(np.sum(pull * at.flange_error))
+        pull = at.own_error @ at.noise.own_information
+        cost += float(np.sum(pull * at.own_error))
         amount = amounts(at.model, self.unknowns, self.about)
         cost += float(np.sum(amount**2 * self.information))
         if self.with_print:
@@ -265,8 +286,10 @@ class _Iteration:
         model = moved(self.state.model, self.unknowns, step[:p])
         if self.with_print:
             model = _with_shift(model, self.views, step[p:])
-        error = rigid.to_vector(rigid.from_vector(self.state.flange_error) @ rigid.from_vector(own))
-        return replace(self.state, model=model, flange_error=error)
+        error = self.state.own_error + own
+        flange = rigid.from_vector(self.state.own_error[:, :6]) @ rigid.from_vector(own[:, :6])
+        error[:, :6] = rigid.to_vector(flange)
+        return replace(self.state, model=model, own_error=error)
 
     def refresh(self, *, noise: bool) -> bool:
         """Estimate the noise anew, and the corners' weights unless they are given.
@@ -305,7 +328,7 @@ def fit_joint(
     unknowns: tuple[Unknown, ...],
     noise: Noise,
     *,
-    flange_error: FloatArray | None = None,
+    own_error: FloatArray | None = None,
     rounds: int = 10,
     fixed_noise: bool = False,
     weight: FloatArray | None = None,
@@ -324,7 +347,9 @@ def fit_joint(
         What is free, see `unknowns_of`.
     noise:
         Start of the noise levels; `print_m` above zero frees every corner within the board's
-        plane, with that prior.
+        plane, `focal` above zero every frame's focal length, with that prior.
+    own_error:
+        Start of the frames' own errors, see `JointState`; zero where it is not given.
     rounds:
         How often noise and weights are estimated anew at most; they are until they stay.
     fixed_noise:
@@ -342,7 +367,10 @@ def fit_joint(
     """
     if not views.has_pose.all():
         raise ValueError("every frame of a joint fit needs base_from_flange")
-    error = np.zeros((len(views), 6)) if flange_error is None else flange_error
+    error = np.zeros((len(views), 7 if noise.focal > 0.0 else 6))
+    if own_error is not None:
+        known = min(error.shape[1], own_error.shape[1])
+        error[:, :known] = own_error[:, :known]
     arm = kinematics or kinematics_of(views)
     run = _Iteration(JointState(model, error, noise), views, unknowns, arm, weight, about)
     settled = False
@@ -365,7 +393,7 @@ def _result(run: _Iteration, settled: bool) -> JointFit:
     return JointFit(
         model=run.state.model,
         noise=run.state.noise,
-        flange_error=run.state.flange_error,
+        own_error=run.state.own_error,
         unknowns=run.unknowns,
         covariance=found.covariance[:p, :p],
         residual_px=run.residual,

@@ -1,7 +1,8 @@
 """Noise levels of corners, robot and print, estimated from the data and never typed in.
 
-Three variance components of a linear mixed model: corner noise, the flange's scatter about the
-logged pose (translation and rotation), and the printed corners' scatter about their grid.
+Variance components of a linear mixed model: corner noise, the flange's scatter about the logged
+pose (translation and rotation), and where asked for the printed corners' scatter about their grid
+and the focal length's about its law.
 Restricted maximum likelihood (Patterson, Thompson 1971) estimates them without the bias that the
 fitted parameters would bring in; plain maximum likelihood compares models that differ in their
 parameters (Pinheiro, Bates 2000, section 2.2.5).
@@ -9,7 +10,7 @@ parameters (Pinheiro, Bates 2000, section 2.2.5).
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -30,26 +31,41 @@ class Noise:
         Of the flange about its logged pose, per axis, in the flange's own frame.
     print_m:
         Of a printed corner about its grid, per axis in the board's plane; zero: held to the grid.
+    focal:
+        Of the focal length about its law, frame by frame, as a share of it; zero: held to the law.
     """
 
     corner_px: float
     flange_m: float
     flange_rad: float
     print_m: float = 0.0
+    focal: float = 0.0
 
     @property
     def flange_information(self) -> FloatArray:
         """(6, 6) inverse covariance of the flange's error."""
         return np.diag([self.flange_m**-2.0] * 3 + [self.flange_rad**-2.0] * 3)
 
+    @property
+    def own_information(self) -> FloatArray:
+        """(F, F) inverse covariance of a frame's own numbers: the flange's six, the focal one."""
+        if self.focal == 0.0:
+            return self.flange_information
+        return np.diag([*np.diag(self.flange_information), self.focal**-2.0])
+
+    @property
+    def log_det_own(self) -> float:
+        """Log-determinant of their covariance."""
+        return -float(np.log(np.diag(self.own_information)).sum())
+
     def near(self, other: Noise, share: float) -> bool:
         """Whether every level differs from the other's by less than this share of it."""
         return bool(np.allclose(astuple(self), astuple(other), rtol=share, atol=0.0))
 
 
-LEAST = Noise(1e-4, 1e-7, 1e-7, 1e-7)
-MOST = Noise(50.0, 0.3, 1.0, 5e-3)
-START_AT_LEAST = Noise(1e-3, 1e-5, 1e-5, 3e-6)
+LEAST = Noise(1e-4, 1e-7, 1e-7, 1e-7, 1e-7)
+MOST = Noise(50.0, 0.3, 1.0, 5e-3, 0.1)
+START_AT_LEAST = Noise(1e-3, 1e-5, 1e-5, 3e-6, 3e-5)
 """Below these the likelihood is flat: a search that starts there never finds its way back."""
 
 
@@ -60,10 +76,11 @@ class JointEquations:
     Attributes
     ----------
     frames:
-        Equations in the flange's six numbers and the shared ones; the last `corner_numbers` of
-        the shared ones are shifts of single corners.
-    flange_error, corner_shift, amount:
-        (N, 6), (C,) and (p,) where the unknowns with a prior stand now.
+        Equations in each frame's own F numbers (the flange's six, and the focal length's error
+        where it scatters) and the shared ones; the last `corner_numbers` of the shared ones are
+        shifts of single corners.
+    own_error, corner_shift, amount:
+        (N, F), (C,) and (p,) where the unknowns with a prior stand now.
     amount_information:
         (p,) inverse variances of the amounts' priors.
     corner_numbers, observations:
@@ -71,7 +88,7 @@ class JointEquations:
     """
 
     frames: FrameEquations
-    flange_error: FloatArray
+    own_error: FloatArray
     corner_shift: FloatArray
     amount: FloatArray
     amount_information: FloatArray
@@ -107,15 +124,15 @@ def scaled(
 ) -> tuple[Reduced, FloatArray]:
     """Equations with noise levels and priors put in, frames eliminated; and the shared prior."""
     frames, information = equations.frames, noise.corner_px**-2.0
-    prior = noise.flange_information
+    prior = noise.own_information
     shared_at = np.concatenate([equations.amount, equations.corner_shift])
     print_information = noise.print_m**-2.0 if equations.corner_numbers else 0.0
     shared_prior = np.concatenate(
         [equations.amount_information, np.full(equations.corner_numbers, print_information)]
     )
-    pull = equations.flange_error @ prior
+    pull = equations.own_error @ prior
     shared_pull = shared_prior * shared_at
-    square = float(np.sum(equations.flange_error * pull)) + float(shared_pull @ shared_at)
+    square = float(np.sum(equations.own_error * pull)) + float(shared_pull @ shared_at)
     weighted = FrameEquations(
         own=frames.own * information,
         own_shared=frames.own_shared * information,
@@ -132,10 +149,10 @@ def profile(equations: JointEquations, noise: Noise, *, restricted: bool = True)
     reduced, _ = scaled(equations, noise)
     step, covariance, log_det = solve_scaled(reduced.shared, reduced.shared_residual)
     square_sum = reduced.square_sum - float(step @ reduced.shared_residual)
-    c, n = equations.corner_numbers, len(equations.flange_error)
+    c, n = equations.corner_numbers, len(equations.own_error)
     minus_two_log = (
         equations.observations * 2.0 * np.log(noise.corner_px)
-        + n * 6.0 * (np.log(noise.flange_m) + np.log(noise.flange_rad))
+        + n * noise.log_det_own
         + reduced.log_det_own
         + square_sum
     )
@@ -149,22 +166,27 @@ def profile(equations: JointEquations, noise: Noise, *, restricted: bool = True)
     return Profile(step, covariance, reduced, float(minus_two_log), square_sum)
 
 
-def _vector(noise: Noise, with_print: bool) -> FloatArray:
-    levels = [noise.corner_px, noise.flange_m, noise.flange_rad]
-    return np.log([*levels, noise.print_m] if with_print else levels)
+def _levels(noise: Noise, estimated: tuple[str, ...]) -> FloatArray:
+    return np.log([getattr(noise, name) for name in estimated])
 
 
 def estimate_noise(
     equations: JointEquations, guess: Noise, *, restricted: bool = True
 ) -> tuple[Noise, float]:
-    """Noise levels that make the data most likely, and -2 log likelihood there."""
-    with_print = equations.corner_numbers > 0
-    low, high = _vector(LEAST, with_print), _vector(MOST, with_print)
-    start = np.maximum(_vector(guess, with_print), _vector(START_AT_LEAST, with_print))
+    """Noise levels that make the data most likely, and -2 log likelihood there.
+
+    Those of print and focal length stay at zero where the guess has them there.
+    """
+    estimated = tuple(f.name for f in fields(Noise) if getattr(guess, f.name) > 0.0)
+    low, high = _levels(LEAST, estimated), _levels(MOST, estimated)
+    start = np.maximum(_levels(guess, estimated), _levels(START_AT_LEAST, estimated))
     start = np.minimum(start, high - 0.1)
 
+    def at(levels: FloatArray) -> Noise:
+        return replace(guess, **dict(zip(estimated, np.exp(levels).tolist(), strict=True)))
+
     def cost(levels: FloatArray) -> float:
-        return profile(equations, Noise(*np.exp(levels)), restricted=restricted).minus_two_log
+        return profile(equations, at(levels), restricted=restricted).minus_two_log
 
     found = minimize(
         cost,
@@ -173,4 +195,4 @@ def estimate_noise(
         bounds=list(zip(low, high, strict=True)),
         options={"maxiter": 40, "ftol": 1e-9, "eps": 1e-4},
     )
-    return Noise(*(float(v) for v in np.exp(found.x))), float(found.fun)
+    return at(found.x), float(found.fun)

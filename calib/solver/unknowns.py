@@ -160,21 +160,22 @@ class Dependence:
         (B, M, 3) movements of the board's corners.
     local:
         (N, A + 6 + B, p).
-    flange:
-        (N, A + 6, 6) how the active optics and the pose in the camera follow a small error of the
-        flange in its own frame: a lens that focuses on the board follows it as well.
+    own:
+        (N, A + 6, F) how the active optics and the pose in the camera follow the frame's own
+        numbers: a small error of the flange in its own frame (a lens that focuses on the board
+        follows it as well), and the focal length's where it has one.
     """
 
     state: Walk
     active: tuple[int, ...]
     modes: FloatArray
     local: FloatArray
-    flange: FloatArray
+    own: FloatArray
 
     @property
     def pose_by_flange(self) -> FloatArray:
-        """(N, 6, 6) the pose's share of `flange`."""
-        return self.flange[:, len(self.active) :]
+        """(N, 6, 6) how the pose follows the flange."""
+        return self.own[:, len(self.active) :, :6]
 
 
 def dependence(
@@ -184,21 +185,27 @@ def dependence(
     *,
     kinematics: ArmKinematics | None,
     flange_error: FloatArray | None,
+    focal_error: FloatArray | None = None,
 ) -> Dependence:
     """Differentiate the walk by every free number (central differences, one walk a side)."""
-    journey = Journey(model, views, kinematics=kinematics, flange_error=flange_error)
+    journey = Journey(
+        model, views, kinematics=kinematics, flange_error=flange_error, focal_error=focal_error
+    )
     columns = [_column(journey, model, unknown) for unknown in unknowns]
-    by_flange = [_flange_column(journey, k) for k in range(6)]
+    by_own = [_flange_column(journey, k) for k in range(6)]
+    if focal_error is not None:
+        sides = journey.state.optics[:, _SIDES] / (1.0 + focal_error[:, None])
+        by_own.append(_Column(np.array(_SIDES), sides, None, None))
     n, p = len(views), len(unknowns)
     followed = np.zeros(len(model.optics), dtype=bool)
-    for column in (*columns, *by_flange):
+    for column in (*columns, *by_own):
         followed[column.followed] = True
     active = np.flatnonzero(followed)
     moving = [k for k, c in enumerate(columns) if c.points is not None and c.points.any()]
     a = len(active)
     local = np.zeros((n, a + 6 + len(moving), p))
-    flange = np.zeros((n, a + 6, 6))
-    for into, found in ((local, columns), (flange, by_flange)):
+    own = np.zeros((n, a + 6, len(by_own)))
+    for into, found in ((local, columns), (own, by_own)):
         for k, column in enumerate(found):
             into[:, np.searchsorted(active, column.followed), k] = column.optics
             if column.pose is not None:
@@ -207,7 +214,7 @@ def dependence(
         local[:, a + 6 + b, k] = 1.0
     state = journey.state
     modes = np.array([columns[k].points for k in moving]).reshape(-1, *state.points_m.shape)
-    return Dependence(state, tuple(int(c) for c in active), modes, local, flange)
+    return Dependence(state, tuple(int(c) for c in active), modes, local, own)
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,8 @@ def _pixels_by(found: Dependence) -> tuple[FloatArray, FloatArray]:
     by_mode = np.einsum("nmcj,bmj->nmcb", by_point, found.modes)
     columns = np.concatenate([by_optics[..., list(found.active)], by_pose, by_mode], axis=-1)
     by_free = np.einsum("nmcq,nqp->nmcp", columns, found.local)
-    q = found.flange.shape[1]
-    return by_free, np.einsum("nmcq,nqj->nmcj", columns[..., :q], found.flange)
+    q = found.own.shape[1]
+    return by_free, np.einsum("nmcq,nqj->nmcj", columns[..., :q], found.own)
 
 
 def _all_numbers(model: CellModel, lens: tuple[str, ...]) -> tuple[Unknown, ...]:

@@ -1,0 +1,53 @@
+"""A focal length that scatters from frame to frame, following nothing that was logged.
+
+An autofocus that never ends in the same place is noise, but not the arm's: taken for the arm's it
+is spread over all directions, too much across the optical axis and too little along it, and chance
+then looks like physics. With a noise level of its own nothing is named for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from calib.discovery.leftover import Leftover
+from calib.discovery.locate import Cell
+from calib.discovery.score import Score
+
+_WORTH = 30.0
+"""A scatter must lower -2 log likelihood by this much; where there is none it is 3 at most."""
+
+_GUESS = 1e-4
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """By which share of itself the focal length scatters, and what to tell of it."""
+
+    relative: float
+    cell: Cell
+
+
+def scattered(leftover: Leftover) -> Scatter | None:
+    """How the focal length scatters in the best cell that was found; None where it does not.
+
+    A field of shifts that is left in the pictures bends poses along the axis, too: beside one
+    nothing can be said.
+    """
+    search = leftover.search
+    in_pictures = any(cell.curve is None for cell in leftover.cells)
+    if in_pictures or not search.fitter.has_robot:
+        return None
+    fit = search.best.fit
+    noise = replace(fit.noise, focal=_GUESS)
+    tried = search.fitter.fit(fit.model, noise, fit.own_error, fit.weight)
+    gain = fit.minus_two_log - tried.minus_two_log
+    if gain < _WORTH:
+        return None
+    relative = tried.noise.focal
+    p_value = float(0.5 * chi2.sf(gain, 1))
+    score = Score(gain, 1, p_value, np.array([relative]))
+    where = f"each frame by itself, {relative:.2g} of it RMS"
+    return Scatter(relative, Cell("focal_length", "lens", "chance", score, 1, None, where))
