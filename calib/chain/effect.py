@@ -170,6 +170,13 @@ class Present:
             if p.role == "amount" and p.identifiable and k not in self.held
         )
 
+    def same_but_amounts(self, other: Present) -> bool:
+        """Whether only the fitted numbers differ."""
+        if self.effect.label != other.effect.label or len(self.values) != len(other.values):
+            return False
+        settings = [k for k, p in enumerate(self.effect.parameters) if p.role == "setting"]
+        return bool((self.values[settings] == other.values[settings]).all())
+
     def as_mapping(self) -> dict[str, float]:
         """Parameter name to value."""
         return {p.name: float(v) for p, v in zip(self.effect.parameters, self.values, strict=True)}

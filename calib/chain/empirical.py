@@ -19,6 +19,8 @@ from calib.views import FloatArray, Views
 
 LEGENDRE_TERMS = 4
 HARMONICS = 3
+FINE = 3
+"""How many times as many functions a finer curve has."""
 
 
 @dataclass(frozen=True)
@@ -176,8 +178,13 @@ def covariate_named(name: str) -> Covariate:
     return {covariate.name: covariate for covariate in COVARIATES}[name]
 
 
-def basis(covariate: Covariate, value: FloatArray, low: float, high: float) -> FloatArray:
-    """(N, B) smooth functions of the covariate, without the constant; zero where it is NaN."""
+def basis(
+    covariate: Covariate, value: FloatArray, low: float, high: float, times: int = 1
+) -> FloatArray:
+    """(N, B) smooth functions of the covariate, without the constant; zero where it is NaN.
+
+    `times` as many as are needed for a smooth curve.
+    """
     known = np.asarray(np.isfinite(value).all(axis=1) if value.ndim == 2 else np.isfinite(value))
     safe = np.where(np.isfinite(value), value, 0.0)
     if value.ndim == 2:
@@ -185,10 +192,10 @@ def basis(covariate: Covariate, value: FloatArray, low: float, high: float) -> F
     if covariate.name.startswith("approach"):
         return np.asarray(safe * known)[:, None]
     if covariate.cyclic and high - low > np.pi:
-        waves = [f(k * safe) for k in range(1, HARMONICS + 1) for f in (np.sin, np.cos)]
+        waves = [f(k * safe) for k in range(1, times * HARMONICS + 1) for f in (np.sin, np.cos)]
         return np.asarray(np.stack(waves, axis=1) * known[:, None])
     unit = np.clip(2.0 * (safe - low) / max(high - low, 1e-12) - 1.0, -1.2, 1.2)
-    return np.asarray(legvander(unit, LEGENDRE_TERMS)[:, 1:] * known[:, None])
+    return np.asarray(legvander(unit, times * LEGENDRE_TERMS)[:, 1:] * known[:, None])
 
 
 def wave(value: FloatArray, period: float) -> FloatArray:
@@ -200,20 +207,30 @@ def wave(value: FloatArray, period: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Curve:
-    """Which site follows which covariate, and over what range or with what period."""
+    """Which site follows which covariate, and over what range or with what period.
+
+    A fine curve can have a kink or a narrow bump.
+    """
 
     site: Site
     covariate: Covariate
     low: float
     high: float
     period: float | None = None
+    fine: bool = False
+
+    @property
+    def can_be_finer(self) -> bool:
+        """Whether there is a finer curve of the same site and covariate."""
+        stiff = self.covariate.name.startswith("approach") or self.covariate.name == "gravity"
+        return not (self.fine or stiff or self.period is not None)
 
     def functions(self, walk: Walk) -> FloatArray:
         """(N, B) of the curve's functions."""
         value = self.covariate.of(walk)
         if self.period is not None:
             return wave(value, self.period)
-        return basis(self.covariate, value, self.low, self.high)
+        return basis(self.covariate, value, self.low, self.high, FINE if self.fine else 1)
 
     def carried(self, walk: Walk) -> FloatArray:
         """(N, B) of the functions that carry the curve in a cell.
@@ -262,6 +279,7 @@ def empirical(curve: Curve, functions: int) -> Effect:
             Parameter("low", curve.covariate.unit, curve.low, -1e9, 1e9, role="setting"),
             Parameter("high", curve.covariate.unit, curve.high, -1e9, 1e9, role="setting"),
             Parameter("period", "s", curve.period or 0.0, 0.0, 1e9, role="setting"),
+            Parameter("fine", "1", float(curve.fine), 0.0, 1.0, role="setting"),
         ),
         act=act,
         separable=False,
@@ -281,7 +299,12 @@ def empirical_from(law: str, given: Mapping[str, float]) -> Present:
     site, covariate = site_named(site_name), covariate_named(covariate_name)
     period = given.get("period", 0.0)
     curve = Curve(
-        site, covariate, given.get("low", 0.0), given.get("high", 0.0), period if period else None
+        site,
+        covariate,
+        given.get("low", 0.0),
+        given.get("high", 0.0),
+        period if period else None,
+        bool(given.get("fine", 0.0)),
     )
     functions = 1 + max(int(k[1:].split("_")[0]) for k in given if k[0] == "c")
     effect = empirical(curve, functions)

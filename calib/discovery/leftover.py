@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from calib.chain.empirical import present_curve
 from calib.chain.model import walk
@@ -62,11 +62,31 @@ def look_for_leftover(search: Search, known: tuple[Cell, ...] = ()) -> Leftover:
         if cell.curve is None:
             search.drop_beside_field(cell.site, cell.score.gain)
             break
-        if not _carry(search, cell, views):
+        if not (_carried_finer(search, found, views) or _carry(search, cell, views)):
             break
     search.drop_on_joints({cell.site for cell in found})
     search.drop_beside_curves()
     return Leftover(search, known + tuple(found))
+
+
+def _carried_finer(search: Search, found: list[Cell], views: Views) -> bool:
+    """Whether a finer curve in place of one that is there takes up the last cell of the same site.
+
+    A kink leaves a remainder of a smooth curve, which follows whatever resembles it by chance.
+    """
+    site = found[-1].site
+    for known in found[:-1]:
+        if known.site != site or known.curve is None or not known.curve.can_be_finer:
+            continue
+        state = walk(search.best.fit.model, views)
+        finer = replace(known.curve, fine=True)
+        smooth = present_curve(known.curve, state)
+        if search.put_in(present_curve(finer, state), known.tried, instead_of=smooth):
+            found[found.index(known)] = replace(known, curve=finer)
+            del found[-1]
+            search.run()
+            return True
+    return False
 
 
 def _carry(search: Search, cell: Cell, views: Views) -> bool:

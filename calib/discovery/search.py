@@ -46,6 +46,9 @@ _LIKE_A_CURVE = ("joint_periodic_error", "joint_compliance", "joint_backlash")
 _BESIDE_SHARE = 0.05
 """Beside a field of shifts, or curves in its link, a name must gain this share of their gain."""
 
+_POSE_SHARE = 0.15
+"""The same for a name that only poses show, beside curves anywhere: they bend poses alike."""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -219,10 +222,13 @@ class Search:
         self._settle(fit)
         return self.best.fit
 
-    def put_in(self, present: Present, choices: int = 1) -> bool:
+    def put_in(self, present: Present, choices: int = 1, instead_of: Present | None = None) -> bool:
         """Put an effect in without a contest; False where it does not lower the criterion."""
         fit = self.best.fit
-        tried = self.fitter.with_effects(fit, (*fit.model.effects, present))
+        others = [
+            p for p in fit.model.effects if instead_of is None or not p.same_but_amounts(instead_of)
+        ]
+        tried = self.fitter.with_effects(fit, (*others, present))
         if self._trial(tried, Candidate(present, choices)).criterion > self.best.criterion:
             return False
         self.choices[present.effect.label] = choices
@@ -272,21 +278,24 @@ class Search:
             self._settle(self.fitter.with_effects(self.best.fit, rest))
 
     def drop_beside_curves(self) -> None:
-        """Drop what gains but a trifle of what the unnamed curves in the same link gain.
+        """Drop what gains but a trifle of what the unnamed curves gain.
 
-        A curve of few knots leaves something of what it carries: no name rests on that.
+        A curve leaves something of what it carries: no name rests on that. What the pictures show
+        by themselves is held against curves in its own link only.
         """
         effects = self.best.fit.model.effects
         curves = [p for p in effects if p.effect.name == "empirical"]
         worth = {curve.effect.label: self._missed(curve)[0] for curve in curves}
         for present in effects:
-            beside = sum(
-                worth[c.effect.label] for c in curves if c.effect.link == present.effect.link
-            )
-            if present.effect.name == "empirical" or beside == 0.0:
+            in_link = (c for c in curves if c.effect.link == present.effect.link)
+            if present.effect.seen_without_robot:
+                least = _BESIDE_SHARE * sum(worth[c.effect.label] for c in in_link)
+            else:
+                least = _POSE_SHARE * sum(worth.values())
+            if present.effect.name == "empirical" or least == 0.0:
                 continue
             missed, without = self._missed(present)
-            if missed < _BESIDE_SHARE * beside:
+            if missed < least:
                 self._settle(without)
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
 
