@@ -210,7 +210,7 @@ def _without(
         views.take(rest),
         joint.unknowns,
         joint.noise,
-        flange_error=joint.flange_error[rest],
+        own_error=joint.own_error[rest],
         rounds=1,
         fixed_noise=True,
         weight=joint.weight[rest],

@@ -248,7 +248,6 @@ def _judge(before: Noise, after: Noise) -> Noise:
         min(before.flange_m, after.flange_m),
         min(before.flange_rad, after.flange_rad),
         after.print_m if before.print_m > 0.0 else 0.0,
-        after.focal,
     )
 
 

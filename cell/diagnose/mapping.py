@@ -39,6 +39,7 @@ def as_mapping(
             "flange_m": noise.flange_m if heard else None,
             "flange_rad": noise.flange_rad if heard else None,
             "print_m": noise.print_m,
+            "focal_relative": noise.focal,
         },
         "frames_used": [int(f) for f in found.views.frame],
         "frames_rejected": [vars(r) for r in found.rejected],

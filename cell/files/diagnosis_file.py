@@ -114,6 +114,8 @@ class NoisePart(ResultPart):
     flange_m: NotNegative | None
     flange_rad: NotNegative | None
     print_m: NotNegative
+    focal_relative: NotNegative = 0.0
+    """Scatter of the focal length frame by frame, as a share of it; zero where none is needed."""
 
 
 class DiagnosisFile(ResultPart):

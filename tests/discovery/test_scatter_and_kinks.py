@@ -1,0 +1,68 @@
+"""Chance and kinks look like physics to a smooth curve; they are told for what they are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from calib.chain.kinematics import arm
+from calib.chain.model import walk
+from calib.chain.projection import project
+from calib.discovery.diagnose import diagnose
+from calib.solver.joint import fit_joint
+from calib.solver.unknowns import unknowns_of
+from calib.views import FloatArray, Views
+from tests.discovery.simulated_runs import NOISE, log, plain_cell, record
+
+LOG = log(30)
+SCATTER = 8e-4
+
+
+def with_focus_by_chance(seed: int) -> tuple[Views, FloatArray]:
+    """A recording with an autofocus that never ends in the same place; and its (N,) errors."""
+    rng = np.random.default_rng(seed)
+    error = SCATTER * rng.standard_normal(len(LOG))
+    flange = np.repeat([NOISE.flange_m, NOISE.flange_rad], 3) * rng.standard_normal((len(LOG), 6))
+    state = walk(plain_cell(), LOG, flange_error=flange, focal_error=error)
+    corners = project(state.optics, state.camera_from_board, state.points_m)
+    corners += NOISE.corner_px * rng.standard_normal(corners.shape)
+    return replace(LOG, corners_px=corners), error
+
+
+def test_the_joint_fit_finds_every_frame_s_focal_error_and_leaves_the_arm_its_own():
+    views, true = with_focus_by_chance(71)
+    model = plain_cell()
+    fit = fit_joint(model, views, unknowns_of(model), replace(NOISE, focal=1e-4))
+    assert 0.85 * true.std() < fit.noise.focal < 1.15 * true.std()
+    assert fit.noise.flange_m < 1.8 * NOISE.flange_m
+    assert 0.6 * NOISE.flange_rad < fit.noise.flange_rad < 1.5 * NOISE.flange_rad
+    assert np.corrcoef(fit.own_error[:, 6], true)[0, 1] > 0.97
+
+
+def test_a_focal_length_that_scatters_by_chance_is_told_as_that_and_nothing_is_named_for_it():
+    found = diagnose(with_focus_by_chance(72)[0])
+    assert found.verdict == "unexplained"
+    assert found.effects == ()
+    assert found.unexplained is not None
+    assert (found.unexplained.site, found.unexplained.covariate) == ("focal_length", "chance")
+    assert found.unexplained.p_value < 1e-8
+
+
+def kinked() -> Views:
+    """The third joint goes wrong by 15 mrad a radian from 1.2 rad on."""
+    kinematics = arm("ur5e")
+    bent = LOG.joints_rad.copy()
+    bent[:, 2] += 1.5e-2 * np.maximum(0.0, bent[:, 2] - 1.2)
+    made = record(plain_cell(), replace(LOG, base_from_flange=kinematics.forward(bent)), seed=73)
+    return replace(made, base_from_flange=LOG.base_from_flange[made.frame])
+
+
+def test_a_kink_is_carried_by_one_finer_curve_and_nothing_is_named_for_what_a_smooth_one_leaves():
+    found = diagnose(kinked())
+    assert found.verdict == "unexplained"
+    assert found.effects == ()
+    assert found.unexplained is not None
+    assert (found.unexplained.site, found.unexplained.covariate) == ("joint_3", "joint_3")
+    (curve,) = found.twin.model.effects
+    assert curve.as_mapping()["fine"] == 1.0
