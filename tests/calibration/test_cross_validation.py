@@ -151,7 +151,7 @@ def test_frames_that_alone_fix_a_number_cannot_be_left_out() -> None:
     same = np.zeros((len(views), 6))
     flat = replace(views, base_from_flange=np.tile(views.base_from_flange[:1], (len(views), 1, 1)))
     with pytest.raises(CalibrationError, match="do not fix every number"):
-        cross_validate(replace(joint, flange_error=same), flat, SPAN_M)
+        cross_validate(replace(joint, own_error=same), flat, SPAN_M)
 
 
 def test_the_file_tells_it_all() -> None:
