@@ -16,6 +16,7 @@ from calib.chain.walk import Walk
 from calib.views import FloatArray, Views
 
 _STEP_SHARE = 1e-4
+_SIDES = (COLUMN["alpha_px"], COLUMN["beta_px"])
 _FLANGE_STEP = 1e-5
 """Metres and radians."""
 _OPTICS_TYPICAL = {"alpha_px": 10.0, "beta_px": 10.0, "u0_px": 10.0, "v0_px": 10.0, "skew_px": 5.0}
@@ -195,7 +196,7 @@ def dependence(
     by_own = [_flange_column(journey, k) for k in range(6)]
     if focal_error is not None:
         sides = journey.state.optics[:, _SIDES] / (1.0 + focal_error[:, None])
-        by_own.append(_Column(np.array(_SIDES), sides, None, None))
+        by_own.append(_Column(np.array(_SIDES, dtype=np.int64), sides, None, None))
     n, p = len(views), len(unknowns)
     followed = np.zeros(len(model.optics), dtype=bool)
     for column in (*columns, *by_own):
