@@ -46,6 +46,9 @@ _TREND = np.linspace(-1.0, 1.0, FOLDS) / np.linalg.norm(np.linspace(-1.0, 1.0, F
 _SEEN = 1e-3
 """Share of the largest variance below which a direction of a quantity is only rounding."""
 
+_ROUNDING = 1e-4
+"""Share of a mean variance that a difference of two variances cannot be trusted below."""
+
 Verdict = Literal["agree", "sigma_too_small", "single_frames"]
 
 
@@ -202,8 +205,8 @@ def _without(
     p, rest = len(joint.unknowns), ~out
     left = total - marginal[out, :p, :p].sum(axis=0)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(left), 1e-300))
+    named = ", ".join(str(f) for f in views.frame[out])
     if np.linalg.eigvalsh(left * scale[:, None] * scale)[0] < UNDETERMINED:
-        named = ", ".join(str(f) for f in views.frame[out])
         raise CalibrationError(f"without the frames {named} the others do not fix every number")
     fit = fit_joint(
         joint.model,
@@ -215,6 +218,11 @@ def _without(
         fixed_noise=True,
         weight=joint.weight[rest],
     )
+    if not fit.converged:
+        raise CalibrationError(
+            f"without the frames {named} the joint fit does not come to rest: the others hardly fix"
+            " every number"
+        )
     before, after = (amounts(m, joint.unknowns, joint.model) for m in (joint.model, fit.model))
     variance = _inverse(left) - _inverse(total)
     return _Fold(after - before, variance, judge(fit, views.take(out), joint.weight[out]))
@@ -230,15 +238,14 @@ def _move(name: str, rows: FloatArray, folds: Sequence[_Fold]) -> Move:
     The moves of K equal folds add up to nothing (what they have in common is the fit of all
     frames), hence K - 1 in their chi squares.
     """
-    spread = [rows @ f.variance @ rows.T for f in folds]
-    z = np.array([rows @ f.moved / np.sqrt(np.diag(s)) for f, s in zip(folds, spread, strict=True)])
-    seen = _directions(np.mean(spread, axis=0))
-    unit = np.array(
-        [
-            np.linalg.solve(np.linalg.cholesky(seen @ s @ seen.T), seen @ rows @ f.moved)
-            for f, s in zip(folds, spread, strict=True)
-        ]
-    )
+    spread = np.array([rows @ f.variance @ rows.T for f in folds])
+    moved = np.array([rows @ f.moved for f in folds])
+    mean = spread.mean(axis=0)
+    least = _ROUNDING * np.diag(mean)
+    z = moved / np.sqrt(np.maximum(np.einsum("kqq->kq", spread), least))
+    seen = _directions(mean)
+    root = np.linalg.cholesky(seen @ spread @ seen.T + _ROUNDING * np.eye(len(seen)))
+    unit = np.linalg.solve(root, (moved @ seen.T)[:, :, None])[:, :, 0]
     k, rank = unit.shape
     square, drift = float(np.sum(unit**2)), float(np.sum((_TREND @ unit) ** 2))
     worst, _ = np.unravel_index(np.argmax(np.abs(z)), z.shape)
@@ -253,10 +260,11 @@ def _move(name: str, rows: FloatArray, folds: Sequence[_Fold]) -> Move:
 
 
 def _directions(variance: FloatArray) -> FloatArray:
-    """(s, r) combinations of r numbers that are independent and not only rounding."""
+    """(s, r) independent combinations of r numbers, of variance one, without mere rounding."""
     unit = 1.0 / np.sqrt(np.diag(variance))
     value, vector = np.linalg.eigh(variance * unit[:, None] * unit)
-    return np.asarray(vector[:, value > _SEEN * value[-1]].T * unit)
+    seen = value > _SEEN * value[-1]
+    return np.asarray((vector[:, seen] / np.sqrt(value[seen])).T * unit)
 
 
 def _pulls(
@@ -273,7 +281,7 @@ def _pulls(
         without = _inverse(total - one[:p, :p])
         move = rows @ (without @ -one[:p, p])
         variance = np.einsum("qi,ij,qj->q", rows, without - covariance, rows)
-        z = np.abs(move) / np.sqrt(np.maximum(variance, 1e-9 * sigma**2))
+        z = np.abs(move) / np.sqrt(np.maximum(variance, _ROUNDING**2 * sigma**2))
         share = np.abs(move) / sigma
         telling = np.where((z > limit) & (share > _MATTERS), share, 0.0)
         worst = int(telling.argmax())

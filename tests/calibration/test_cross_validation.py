@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -152,6 +153,17 @@ def test_frames_that_alone_fix_a_number_cannot_be_left_out() -> None:
     flat = replace(views, base_from_flange=np.tile(views.base_from_flange[:1], (len(views), 1, 1)))
     with pytest.raises(CalibrationError, match="do not fix every number"):
         cross_validate(replace(joint, own_error=same), flat, SPAN_M)
+
+
+def test_a_fit_that_does_not_come_to_rest_is_no_witness(monkeypatch: pytest.MonkeyPatch) -> None:
+    joint, views = fitted(0)
+
+    def restless(*given: Any, **named: Any) -> JointFit:
+        return replace(fit_joint(*given, **named), converged=False)
+
+    monkeypatch.setattr("calib.calibration.cross_validation.fit_joint", restless)
+    with pytest.raises(CalibrationError, match="does not come to rest"):
+        cross_validate(joint, views, SPAN_M)
 
 
 def test_the_file_tells_it_all() -> None:
