@@ -19,6 +19,10 @@ from calib.discovery.score import Score
 _WORTH = 30.0
 """A scatter must lower -2 log likelihood by this much; where there is none it is 3 at most."""
 
+_WIDESPREAD = 0.3
+"""The median error must be this share of the level (0.67 where all frames scatter): one frame that
+is far off is no scatter."""
+
 _GUESS = 1e-4
 
 
@@ -44,9 +48,9 @@ def scattered(leftover: Leftover) -> Scatter | None:
     noise = replace(fit.noise, focal=_GUESS)
     tried = search.fitter.fit(fit.model, noise, fit.own_error, fit.weight)
     gain = fit.minus_two_log - tried.minus_two_log
-    if gain < _WORTH:
-        return None
     relative = tried.noise.focal
+    if gain < _WORTH or float(np.median(np.abs(tried.own_error[:, 6]))) < _WIDESPREAD * relative:
+        return None
     p_value = float(0.5 * chi2.sf(gain, 1))
     score = Score(gain, 1, p_value, np.array([relative]))
     where = f"each frame by itself, {relative:.2g} of it RMS"

@@ -5,11 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from calib.chain.effects import make_effect
 from calib.chain.kinematics import arm
 from calib.chain.model import walk
 from calib.chain.projection import project
 from calib.discovery.diagnose import diagnose
+from calib.discovery.leftover import Leftover
+from calib.discovery.scatter import scattered
+from calib.discovery.search import Search
+from calib.discovery.start import Fitter
 from calib.solver.joint import fit_joint
 from calib.solver.unknowns import unknowns_of
 from calib.views import FloatArray, Views
@@ -66,3 +72,33 @@ def test_a_kink_is_carried_by_one_finer_curve_and_nothing_is_named_for_what_a_sm
     assert (found.unexplained.site, found.unexplained.covariate) == ("joint_3", "joint_3")
     (curve,) = found.twin.model.effects
     assert curve.as_mapping()["fine"] == 1.0
+
+
+def searched(views: Views) -> Search:
+    fitter = Fitter(views)
+    return Search(fitter.fit(plain_cell(), NOISE), fitter)
+
+
+def test_one_frame_that_is_far_off_is_no_scatter():
+    error = np.zeros(len(LOG))
+    error[4] = 6e-3
+    state = walk(plain_cell(), LOG, focal_error=error)
+    corners = project(state.optics, state.camera_from_board, state.points_m)
+    corners += NOISE.corner_px * np.random.default_rng(74).standard_normal(corners.shape)
+    search = searched(replace(LOG, corners_px=corners))
+    assert scattered(Leftover(search, ())) is None
+    wide = searched(with_focus_by_chance(75)[0])
+    found = scattered(Leftover(wide, ()))
+    assert found is not None
+    assert 0.5 * SCATTER < found.relative < 1.6 * SCATTER
+
+
+@pytest.mark.parametrize("side_m", [0.0, 1e3])
+def test_from_which_side_the_first_frame_was_focused_is_found(side_m):
+    play = make_effect(
+        "focus_hysteresis", {"relative": 2e-3, "first_frame": 0.0, "first_came_from_m": side_m}
+    )
+    search = searched(record(plain_cell().with_effects([play]), LOG, seed=76))
+    best, _ = search.ranked(search.best.fit)[0]
+    assert best.effect.name == "focus_hysteresis"
+    assert best.present.as_mapping()["first_came_from_m"] == side_m

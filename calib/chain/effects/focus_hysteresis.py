@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from calib.chain import rigid
 from calib.chain.effect import Effect, Parameter
 from calib.chain.walk import Walk
-from calib.views import FloatArray
+from calib.views import FloatArray, Views
+
+_FIRST_FRAME, _FIRST_CAME_FROM_M = 1, 2
 
 
 def _came_from_m(walk: Walk) -> FloatArray:
@@ -27,9 +31,17 @@ def _came_from_m(walk: Walk) -> FloatArray:
 
 
 def _act(values: FloatArray, walk: Walk) -> None:
-    growth = 1.0 + values[0] * np.sign(walk.focused_m - _came_from_m(walk))
+    first = walk.views.frame == values[_FIRST_FRAME]
+    before = np.where(first, values[_FIRST_CAME_FROM_M], _came_from_m(walk))
+    growth = 1.0 + values[0] * np.sign(walk.focused_m - before)
     walk.column("alpha_px")[:] *= growth
     walk.column("beta_px")[:] *= growth
+
+
+def _candidates(views: Views) -> Sequence[Mapping[str, float]]:
+    """The first frame's focus came from nearer, or from farther: nobody saw it before."""
+    first = float(views.frame.min())
+    return [{"first_frame": first, "first_came_from_m": side} for side in (0.0, 1e3)]
 
 
 EFFECT = Effect(
@@ -38,8 +50,13 @@ EFFECT = Effect(
     physics="The focus drive has play: it stops elsewhere when it comes from near than from far.",
     equation="alpha = alpha0 * (1 + relative * sign(distance - distance it came from))",
     source="play of a focus drive; size from autofocus repeatability of machine-vision lenses",
-    parameters=(Parameter("relative", "1", 3e-4, -0.02, 0.02),),
+    parameters=(
+        Parameter("relative", "1", 3e-4, -0.02, 0.02),
+        Parameter("first_frame", "1", -1.0, -1.0, 1e12, role="setting"),
+        Parameter("first_came_from_m", "m", 0.0, 0.0, 1e3, role="setting"),
+    ),
     act=_act,
+    candidates=_candidates,
     confounded_with=("focus_breathing",),
     remedy="Always focus from the same side (drive past the target and come back), or lock it.",
 )
