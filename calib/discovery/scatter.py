@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from calib.discovery.leftover import Leftover
+from calib.discovery.leftover import Leftover, is_shape_of_law
 from calib.discovery.locate import Cell
 from calib.discovery.score import Score
 
@@ -51,7 +51,7 @@ def scattered(leftover: Leftover) -> Scatter | None:
     relative = tried.noise.focal
     if gain < _WORTH or float(np.median(np.abs(tried.own_error[:, 6]))) < _WIDESPREAD * relative:
         return None
-    p_value = float(0.5 * chi2.sf(gain, 1))
-    score = Score(gain, 1, p_value, np.array([relative]))
+    score = Score(gain, 1, float(0.5 * chi2.sf(gain, 1)), np.array([relative]))
     where = f"each frame by itself, {relative:.2g} of it RMS"
-    return Scatter(relative, Cell("focal_length", "lens", "chance", score, 1, None, where))
+    cell = Cell("focal_length", "lens", "chance", score, 1, None, where)
+    return None if is_shape_of_law(cell, search) else Scatter(relative, cell)
