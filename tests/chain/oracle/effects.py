@@ -188,12 +188,14 @@ def _natural_spline(height: Array, at: Array) -> Array:
 
 @_of("focus_hysteresis")
 def _(p: Numbers, scene: Scene) -> None:
-    _scale_focal(scene, 1.0 + p["relative"] * _side(scene))
+    _scale_focal(scene, 1.0 + p["relative"] * _side(p, scene))
 
 
-def _side(scene: Scene) -> float:
+def _side(p: Numbers, scene: Scene) -> float:
     """Plus one where the lens came from nearer, minus one where from farther."""
-    if scene.views.mount == "eye_in_hand":
+    if scene.logged("frame") == p["first_frame"]:
+        before = p["first_came_from_m"]
+    elif scene.views.mount == "eye_in_hand":
         approach = formulas.flange(scene.views.approach_joints_rad[scene.frame], scene.nominal_dh)
         before = scene.depth(scene.pose(approach))
     else:
