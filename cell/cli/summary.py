@@ -28,6 +28,8 @@ def calibration_summary(calibration: Mapping[str, Any]) -> str:
     checked = calibration.get("cross_validation")
     if checked:
         lines.append(f"cross-validation: {checked['why']}")
+    elif calibration.get("robot") and "cross_validation" in calibration.get("missing", {}):
+        lines.append(f"not cross-validated: {calibration['missing']['cross_validation']}")
     return "\n".join(lines)
 
 

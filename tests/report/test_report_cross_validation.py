@@ -8,7 +8,6 @@ from html import unescape
 from typing import Any
 
 import made_up_cell
-import pytest
 
 from calib.calibration import Calibration, calibrate
 from calib.calibration.mapping import as_mapping
@@ -55,7 +54,16 @@ def test_frames_that_carry_an_estimate_are_listed() -> None:
     assert '<th scope="row">frame 17</th><td>focal length α</td><td>2.3</td>' in page
 
 
-@pytest.mark.parametrize("missing", [{"cross_validation": "9 frames took part"}, {}])
-def test_without_it_the_reason_is_told(missing: dict[str, str]) -> None:
-    page = _page(_content(cross_validation=None, missing=missing))
-    assert f"Not cross-validated: {missing.get('cross_validation', 'no joint fit')}." in page
+def test_without_it_the_reason_is_told() -> None:
+    content = _content(cross_validation=None, missing={"cross_validation": "9 frames took part"})
+    told = "Not cross-validated: 9 frames took part."
+    assert told in _page(content)
+    assert told in sentences(replace(made_up_cell.full(9), calibration=content))
+    assert "not cross-validated: 9 frames took part" in calibration_summary(content)
+
+
+def test_without_the_robot_only_its_section_says_so() -> None:
+    content = _content(cross_validation=None, missing={}, robot=None)
+    assert "Not cross-validated: no joint fit." in _page(content)
+    first = " ".join(sentences(replace(made_up_cell.full(9), calibration=content)))
+    assert "cross-validated" not in first + calibration_summary(content)

@@ -25,10 +25,14 @@ _QUANTITIES = {
 
 
 def cross_validation_sentences(data: ReportData) -> Iterator[str]:
-    """For the first screen: the verdict in words."""
-    found = (data.calibration or {}).get("cross_validation")
+    """For the first screen: the verdict in words, or why a fit with the robot has none."""
+    calibration = data.calibration or {}
+    found = calibration.get("cross_validation")
+    reason = (calibration.get("missing") or {}).get("cross_validation")
     if found:
         yield found["why"]
+    elif reason and calibration.get("robot"):
+        yield f"Not cross-validated: {reason}."
 
 
 def cross_validation(calibration: Mapping[str, Any]) -> str:
