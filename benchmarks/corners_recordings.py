@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.corner_pictures import Image
 from calib.detection import detect, make_ready
-from calib.detection.charuco import layouts
+from calib.detection.markers import layouts
 from calib.views import Board
 from cell.recording import Recording, read_recording
 

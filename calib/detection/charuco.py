@@ -2,41 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.detection.refine import (
-    Fitted,
-    doubtful,
-    edge_angles,
-    fit_closely,
-    fit_grid,
-    starts,
-)
+from calib.detection.candidates import find_candidates
+from calib.detection.charuco_fit import FEWEST_CORNERS, Guess, Seen, fit_charuco
+from calib.detection.grid import spread_out, with_predictions
+from calib.detection.lattice import grow_lattices
+from calib.detection.markers import layouts, on_board, place_by_markers
+from calib.detection.refine import Fitted
 from calib.detection.result import FloatArray, Rejected
-from calib.detection.saddle import ANGLE_1, ANGLE_2, CONTRAST, X, Y
+from calib.detection.scales import scaled, scales
 from calib.views import Board
 
-_FEWEST_CORNERS = 6
 _FEWEST_MARKERS = 2
 _NEAREST_MARKER_CORNERS = 6
-
-
-def layouts(board: Board) -> list[Any]:
-    """OpenCV's description of the board, as drawn since version 4.6 and as before."""
-    if board.marker_m is None or board.dictionary is None:
-        return []
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
-    size = (board.cols + 1, board.rows + 1)
-    both = []
-    for legacy in (False, True):
-        layout = cv2.aruco.CharucoBoard(size, board.square_m, board.marker_m, dictionary)
-        layout.setLegacyPattern(legacy)
-        both.append(layout)
-    return both
+_MOST_PIECES = 3
+# a piece of the board may leave more doubt than the whole, which is judged once it is fitted
+_RUNNER_UP = 0.85
+# a guess that gives this share of the corners is not followed by others
+_ENOUGH = 0.8
+# the reader takes seconds for some pictures of twelve megapixels
+_READ_PIXELS = 4e6
 
 
 def _eight_bit(image: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -67,11 +58,9 @@ def _expected_corners(
     return float(np.median(np.abs(misfit))), expected.reshape(board.rows, board.cols, 2)
 
 
-def _by_markers(image: NDArray[np.float32], board: Board) -> FloatArray | Rejected:
-    """(rows, cols, 2) where the markers say the corners are, seen or not."""
+def _by_reading(image: NDArray[np.float32], board: Board) -> Guess | Rejected:
+    """Where the markers that can be read say the corners are, seen or not."""
     drawn = layouts(board)
-    if not drawn:
-        return Rejected("a ChArUco board needs the size of its markers and their dictionary")
     detector = cv2.aruco.ArucoDetector(drawn[0].getDictionary())
     marker_corners, marker_ids, _ = detector.detectMarkers(_eight_bit(image))
     if marker_ids is None or len(marker_ids) < _FEWEST_MARKERS:
@@ -80,25 +69,40 @@ def _by_markers(image: NDArray[np.float32], board: Board) -> FloatArray | Reject
     fitting = [entry for entry in found if entry is not None]
     if not fitting:
         return Rejected("the markers read are not those of this board")
-    return min(fitting, key=lambda entry: entry[0])[1]
+    return Guess(min(fitting, key=lambda entry: entry[0])[1])
 
 
-def _mended(fitted: Fitted, doubt: NDArray[np.bool_], expected_px: FloatArray) -> FloatArray:
-    """Fit parameters with the unseen corners where expected, and of typical looks."""
-    parameters = fitted.parameters.copy()
-    parameters[doubt] = np.median(parameters[~doubt], axis=0)
-    parameters[doubt, X], parameters[doubt, Y] = expected_px[doubt].T
-    parameters[doubt, ANGLE_1 : ANGLE_2 + 1] = edge_angles(parameters[..., [X, Y]])[doubt]
-    odd = np.add.outer(np.arange(doubt.shape[0]), np.arange(doubt.shape[1])) % 2
-    typical = np.median(fitted.first_dark_contrast[~doubt])
-    parameters[doubt, CONTRAST] = (typical * (1 - 2 * odd))[doubt]
-    return parameters
+def _by_lattice(image: NDArray[np.float32], board: Board) -> Guess | None:
+    """Where a lattice of corners that seems to bear the board's markers has the corners."""
+    for lattice in grow_lattices(find_candidates(image))[:_MOST_PIECES]:
+        grid = spread_out(lattice)
+        place = place_by_markers(image, grid, board, runner_up=_RUNNER_UP)
+        if place is None:
+            continue
+        corners = on_board(grid, place, board)
+        if board.corner_count - corners.missing >= FEWEST_CORNERS:
+            return Guess(with_predictions(corners).corners_px, place.layout)
+    return None
+
+
+def _guesses(image: NDArray[np.float32], board: Board) -> Iterator[Guess | Rejected]:
+    """Where the corners may be in the full image, one guess after the other."""
+    sizes = scales(image.shape)
+    readable = next(s for s in (1.0, 0.5, 0.25, 0.125) if image.size * s * s <= _READ_PIXELS)
+    for scale in (readable, *sizes):
+        small = scaled(image, scale)
+        found = _by_reading(small, board) if scale == readable else _by_lattice(small, board)
+        if found is not None:
+            yield found if isinstance(found, Rejected) else found.enlarged(scale)
 
 
 def find_charuco(
     image: NDArray[np.float32], board: Board
 ) -> tuple[Fitted, NDArray[np.bool_]] | Rejected:
     """Fit all corners of a ChArUco board and say which were not seen, (rows, cols).
+
+    The markers are read first; where that does not give most corners, lattices of crossings are
+    held against the markers that should lie between them. The best guess wins.
 
     Parameters
     ----------
@@ -107,18 +111,18 @@ def find_charuco(
     board:
         The board; its markers lie in the bright squares.
     """
-    expected = _by_markers(image, board)
-    if isinstance(expected, Rejected):
-        return expected
-    # between the markers of neighbouring bright squares runs a cross free of print
-    clear = 0.45 * (1 - (board.marker_m or 0.0) / board.square_m)
-    first = fit_grid(image, starts(image, expected, aside=0.7 * clear), clear=clear)
-    even_dark = float(np.nanmedian(first.first_dark_contrast)) > 0
-    doubt = doubtful(first, expected, even_dark)
-    if (~doubt).sum() < _FEWEST_CORNERS:
-        return Rejected(f"only {int((~doubt).sum())} of {doubt.size} corners are seen")
-    fine = fit_closely(image, _mended(first, doubt, expected), rough=False, clear=clear)
-    doubt |= doubtful(fine, expected, even_dark)
-    if (~doubt).sum() < _FEWEST_CORNERS:
-        return Rejected(f"only {int((~doubt).sum())} of {doubt.size} corners are clear")
-    return fine, doubt
+    if not layouts(board):
+        return Rejected("a ChArUco board needs the size of its markers and their dictionary")
+    best: Seen | None = None
+    reason: Rejected | None = None
+    for guess in _guesses(image, board):
+        seen = guess if isinstance(guess, Rejected) else fit_charuco(image, guess, board)
+        if isinstance(seen, Rejected):
+            reason = seen if reason is None else reason
+        elif best is None or seen.rank() > best.rank():
+            best = seen
+        if best and best.named_by_markers and best.share_seen(image.shape) >= _ENOUGH:
+            break
+    if best is not None:
+        return best.fitted, best.unseen
+    return Rejected("the picture is too small") if reason is None else reason

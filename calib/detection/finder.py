@@ -4,56 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.detection.candidates import find_candidates
 from calib.detection.grid import Grid, in_board_order, place_board, with_predictions
 from calib.detection.lattice import grow_lattices
-from calib.detection.refine import Fitted, doubtful, fit_closely, fit_grid, starts
-from calib.detection.result import FloatArray, Rejected
-from calib.detection.saddle import PIXEL_VARIANCE, WIDTH, X, Y
+from calib.detection.refine import Fitted, doubtful, enlarged, fit_closely, fit_grid, starts
+from calib.detection.result import Rejected
+from calib.detection.saddle import X, Y
+from calib.detection.scales import FloatImage, scaled, scales
 from calib.views import Board
 
-FloatImage = NDArray[np.float32]
-
-_FIRST_LEVEL_PIXELS = 0.4e6
-_SMALLEST_SIDE_PX = 100
 _MOST_PIECES = 3
 _PARTIAL = "partial view"
 _NOTHING = "no chessboard corners in the picture"
 # a fit at this scale tells the shading and the bend of the lines well enough
 _GOOD_ENOUGH_SCALE = 0.5
-
-
-def _scales(shape: tuple[int, ...]) -> list[float]:
-    """Image scales in the order in which they are tried."""
-    first = 0
-    while shape[0] * shape[1] * 0.25**first > _FIRST_LEVEL_PIXELS:
-        first += 1
-    coarser = [s for s in (first + 1, first + 2) if min(shape[:2]) * 0.5**s >= _SMALLEST_SIDE_PX]
-    return [0.5**s for s in (first, *range(first - 1, -1, -1), *coarser)]
-
-
-def _scaled(image: FloatImage, scale: float) -> FloatImage:
-    if scale == 1.0:
-        return image
-    factor = round(1 / scale)
-    height, width = (side // factor for side in image.shape)
-    whole = image[: height * factor, : width * factor]
-    return np.asarray(
-        cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), dtype=np.float32
-    )
-
-
-def _enlarged(first: FloatArray, scale: float) -> FloatArray:
-    """Fit parameters of a smaller image, as starts on the full one."""
-    starts_full = first.copy()
-    starts_full[..., [X, Y]] = (first[..., [X, Y]] + 0.5) / scale - 0.5
-    blur2 = np.maximum(first[..., WIDTH] ** 2 - PIXEL_VARIANCE, 0.05) / scale**2
-    starts_full[..., WIDTH] = np.sqrt(blur2 + PIXEL_VARIANCE)
-    return starts_full
 
 
 def _filled(image: FloatImage, grid: Grid) -> tuple[Fitted, int]:
@@ -84,8 +51,8 @@ def _on_level(image: FloatImage, board: Board) -> tuple[Grid, Fitted] | Rejected
 
 
 def _found(image: FloatImage, board: Board) -> Iterator[tuple[float, Grid, Fitted] | Rejected]:
-    for scale in _scales(image.shape):
-        found = _on_level(_scaled(image, scale), board)
+    for scale in scales(image.shape):
+        found = _on_level(scaled(image, scale), board)
         yield found if isinstance(found, Rejected) else (scale, *found)
 
 
@@ -105,7 +72,7 @@ def find_chessboard(image: FloatImage, board: Board) -> tuple[Fitted, NDArray[np
             best = _more_telling(best, found)
             continue
         scale, grid, coarse = found
-        first = _enlarged(coarse.parameters, scale)
+        first = enlarged(coarse.parameters, scale)
         fine = fit_closely(image, first, rough=scale < _GOOD_ENOUGH_SCALE)
         doubt = doubtful(fine, first[..., [X, Y]], grid.first_dark)
         if doubt.any():

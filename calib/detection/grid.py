@@ -49,7 +49,7 @@ class Grid:
         return Grid(corners, dark)
 
 
-def _spread_out(lattice: Lattice) -> Grid:
+def spread_out(lattice: Lattice) -> Grid:
     """The whole lattice as one grid, NaN where it has no corner."""
     low = lattice.cells.min(axis=0)
     places = lattice.cells - low
@@ -84,7 +84,7 @@ def _placements(whole: Grid, rows: int, cols: int) -> Iterator[tuple[int, Grid]]
 
 def _has_full_line_outside(lattice: Lattice, rows: int, cols: int) -> bool:
     """Whether the lattice is clearly larger than the board."""
-    seen = np.isfinite(_spread_out(lattice).corners_px[..., 0])
+    seen = np.isfinite(spread_out(lattice).corners_px[..., 0])
     long, short = max(rows, cols), min(rows, cols)
     full_rows = int((seen.sum(axis=1) >= short).sum())
     full_cols = int((seen.sum(axis=0) >= short).sum())
@@ -109,7 +109,7 @@ def place_board(lattice: Lattice, board: Board) -> list[Grid] | Rejected:
     if _has_full_line_outside(lattice, board.rows, board.cols):
         return Rejected(f"the pattern seen is larger than {board.rows} x {board.cols} corners")
     found: list[tuple[int, Grid]] = []
-    whole = _spread_out(lattice)
+    whole = spread_out(lattice)
     for quarters in (0, 1) if board.rows != board.cols else (0,):
         turned = _padded(whole.turned(quarters), board.rows, board.cols)
         found += _placements(turned, board.rows, board.cols)

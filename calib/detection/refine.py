@@ -14,6 +14,7 @@ from calib.detection.saddle import (
     ANGLE_2,
     CONTRAST,
     MEAN,
+    NO_MARKS,
     PARAMETERS,
     PIXEL_VARIANCE,
     WIDTH,
@@ -72,7 +73,7 @@ def lattice_steps(corners_px: FloatArray) -> FloatArray:
     return np.concatenate([along_cols, along_rows], axis=-1)
 
 
-def _shortest_step(steps: FloatArray) -> FloatArray:
+def shortest_step(steps: FloatArray) -> FloatArray:
     sides = np.linalg.norm(steps.reshape(*steps.shape[:-1], 2, 2), axis=-1)
     return np.asarray(sides.min(axis=-1))
 
@@ -106,11 +107,20 @@ def starts(
     guess = np.empty((*corners_px.shape[:2], PARAMETERS))
     guess[..., [X, Y]] = corners_px
     guess[..., [ANGLE_1, ANGLE_2]] = edge_angles(corners_px)
-    guess[..., WIDTH] = np.maximum(0.06 * _shortest_step(steps), 0.8)
+    guess[..., WIDTH] = np.maximum(0.06 * shortest_step(steps), 0.8)
     guess[..., MEAN] = sum(level for _, _, level in quarters) / 4
     # d1 > 0 below edge 1 and d2 > 0 left of edge 2: their product is negative in square (+, +)
     guess[..., CONTRAST] = -sum(a * b * level for a, b, level in quarters) / 4
     return guess
+
+
+def enlarged(first: FloatArray, scale: float) -> FloatArray:
+    """Fit parameters of an image that is smaller by `scale`, as starts on the full one."""
+    starts_full = first.copy()
+    starts_full[..., [X, Y]] = (first[..., [X, Y]] + 0.5) / scale - 0.5
+    blur2 = np.maximum(first[..., WIDTH] ** 2 - PIXEL_VARIANCE, 0.05) / scale**2
+    starts_full[..., WIDTH] = np.sqrt(blur2 + PIXEL_VARIANCE)
+    return starts_full
 
 
 def _image_gradient(values: FloatArray, steps: FloatArray, *, vague: bool) -> FloatArray:
@@ -118,7 +128,7 @@ def _image_gradient(values: FloatArray, steps: FloatArray, *, vague: bool) -> Fl
 
     `vague` values are first smoothed over the whole board.
     """
-    values = _quadratic(values) if vague else values
+    values = quadratic(values) if vague else values
     by_col = np.gradient(values, axis=1)
     by_row = np.gradient(values, axis=0)
     det = steps[..., 0] * steps[..., 3] - steps[..., 1] * steps[..., 2]
@@ -127,7 +137,7 @@ def _image_gradient(values: FloatArray, steps: FloatArray, *, vague: bool) -> Fl
     return np.stack([gx, gy], axis=-1)
 
 
-def _quadratic(values: FloatArray) -> FloatArray:
+def quadratic(values: FloatArray) -> FloatArray:
     """The values, some of them NaN, replaced by the quadratic surface through them."""
     row, col = np.meshgrid(*(np.linspace(-1, 1, n) for n in values.shape), indexing="ij")
     basis = np.stack([np.ones_like(row), row, col, row * row, row * col, col * col], axis=-1)
@@ -150,12 +160,12 @@ def _curvature(corners_px: FloatArray, axis: int) -> FloatArray:
         second = line[2:] - 2 * line[1:-1] + line[:-2]
         turning = step[..., 0] * second[..., 1] - step[..., 1] * second[..., 0]
         bend[1:-1] = turning / np.linalg.norm(step, axis=-1) ** 3
-    return _quadratic(np.moveaxis(bend, 0, axis))
+    return quadratic(np.moveaxis(bend, 0, axis))
 
 
 def _blur_share(parameters: FloatArray) -> float:
     """The typical edge width as a share of a square's shorter side."""
-    shortest = _shortest_step(lattice_steps(parameters[..., [X, Y]]))
+    shortest = shortest_step(lattice_steps(parameters[..., [X, Y]]))
     return float(np.nanmedian(parameters[..., WIDTH] / shortest))
 
 
@@ -173,7 +183,7 @@ def _shapes(fitted: FloatArray | None, steps: FloatArray) -> FloatArray:
     return shapes
 
 
-def _extended(corners_px: FloatArray) -> FloatArray:
+def extended(corners_px: FloatArray) -> FloatArray:
     """One more ring of lattice points around, where a homography through the others has them."""
     rows, cols = corners_px.shape[:2]
     place = np.argwhere(np.ones((rows + 2, cols + 2)))[:, ::-1].reshape(rows + 2, cols + 2, 2) - 1.0
@@ -187,7 +197,7 @@ def _extended(corners_px: FloatArray) -> FloatArray:
 def _neighbour_lines(corners_px: FloatArray) -> FloatArray:
     """(rows, cols, 4, 4) the `lines` of `saddle.fit_corners`."""
     rows, cols = corners_px.shape[:2]
-    around = _extended(corners_px)
+    around = extended(corners_px)
     steps = lattice_steps(around)
     lines = np.ones((rows, cols, 4, 4))
     # edge 1 has its normal down the rows, edge 2 against the columns
@@ -209,6 +219,7 @@ def fit_grid(
     bent: bool = False,
     clear: float = 1.0,
     iterations: int = 12,
+    marks: NDArray[np.float32] = NO_MARKS,
 ) -> Fitted:
     """Fit all corners of a grid from (rows, cols, 7) starts.
 
@@ -226,6 +237,7 @@ def fit_grid(
         _neighbour_lines(first[..., [X, Y]]).reshape(-1, 4, 4),
         clear=clear,
         iterations=iterations,
+        marks=marks,
     )
     return Fitted(
         parameters.reshape(rows, cols, PARAMETERS),
@@ -260,7 +272,7 @@ def doubtful(fitted: Fitted, before_px: FloatArray, first_dark: bool) -> NDArray
     """
     if not np.isfinite(fitted.residual).any():
         return np.ones(fitted.residual.shape, dtype=np.bool_)
-    shortest = _shortest_step(lattice_steps(before_px))
+    shortest = shortest_step(lattice_steps(before_px))
     moved = np.linalg.norm(fitted.corners_px - before_px, axis=-1)
     contrast = fitted.first_dark_contrast * (1.0 if first_dark else -1.0)
     # of the corners that are there: half of a board may be out of the picture

@@ -27,6 +27,8 @@ X, Y, ANGLE_1, ANGLE_2, WIDTH, CONTRAST, MEAN = range(PARAMETERS)
 PIXEL_VARIANCE = 1.0 / 12.0
 """Variance of a pixel's own box, in px^2: what the sensor adds to the blur."""
 
+NO_MARKS = np.zeros((0, 0), np.float32)
+
 # below this width a pixel's box no longer passes for a Gaussian (residual above 1e-3 of C)
 _BOX_BELOW_PX = 0.75
 _SMALLEST_WIDTH_PX = 0.05
@@ -215,14 +217,14 @@ def _neighbour_slants(x: float, y: float, p: Any, lines: Any) -> float:
 
 @_kernel
 def _gather(
-    image: Any, p: Any, steps: Any, lines: Any, reach: float, clear: float, pixels: Any
+    image: Any, marks: Any, p: Any, steps: Any, lines: Any, reach: float, clear: float, pixels: Any
 ) -> int:
     """Collect the window's pixels: all near the edges, some of the flat squares.
 
     The window is the parallelogram of the lattice: |a|, |b| <= reach with p - c = a e1 + b e2,
     without the squares' middles, |a| and |b| > clear. A row of `pixels` is x, y, value, what
     neighbouring edges add to the two profiles, the share that the margin leaves of them, and
-    what slanted crossings nearby add to the pattern.
+    what slanted crossings and dark print nearby add to the pattern.
     """
     ax, ay, bx, by = steps
     det = ax * by - ay * bx
@@ -242,6 +244,8 @@ def _gather(
             if count == pixels.shape[0]:
                 return count
             pixels[count, 6] = _neighbour_slants(float(ix), float(iy), p, lines)
+            if marks.shape[0] > 0:
+                pixels[count, 6] -= 2.0 * marks[iy, ix] * (1.0 if p[CONTRAST] > 0 else -1.0)
             add1, left1 = _neighbour_edges(float(ix), float(iy), p[WIDTH], lines, 0)
             add2, left2 = _neighbour_edges(float(ix), float(iy), p[WIDTH], lines, 2)
             pixels[count, 0], pixels[count, 1], pixels[count, 2] = ix, iy, image[iy, ix]
@@ -336,6 +340,7 @@ def _minimise(p: Any, pixels: Any, count: int, shape: Any, A: Any, iterations: i
 @numba.njit(cache=True, nogil=True)
 def _fit(
     image: Any,
+    marks: Any,
     starts: Any,
     steps: Any,
     shapes: Any,
@@ -356,7 +361,8 @@ def _fit(
         if not math.isfinite(p.sum() + steps[i].sum()):
             continue
         longest = max(math.hypot(steps[i, 0], steps[i, 1]), math.hypot(steps[i, 2], steps[i, 3]))
-        count = _gather(image, p, steps[i], lines[i], min(reach, reach_px / longest), clear, pixels)
+        share = min(reach, reach_px / longest)
+        count = _gather(image, marks, p, steps[i], lines[i], share, clear, pixels)
         if count <= PARAMETERS + 4:
             continue
         cost = _minimise(p, pixels, count, shapes[i], A, iterations)
@@ -384,6 +390,7 @@ def fit_corners(
     reach_px: float = 40.0,
     clear: float = 1.0,
     iterations: int = 12,
+    marks: NDArray[np.float32] = NO_MARKS,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Fit every corner from its start.
 
@@ -409,6 +416,9 @@ def fit_corners(
         Pixels farther than this share of a step from both edges are left out (markers there).
     iterations:
         Most Levenberg-Marquardt steps.
+    marks:
+        (h, w) share of each pixel that is dark print in the bright squares, blurred as the
+        picture is; `NO_MARKS` where there is none.
 
     Returns
     -------
@@ -416,6 +426,6 @@ def fit_corners(
     of the residual in grey levels. Where the fit broke down the latter two are NaN.
     """
     fitted, covariance, residual = _fit(
-        image, starts, steps, shapes, lines, reach_px, reach, clear, iterations
+        image, marks, starts, steps, shapes, lines, reach_px, reach, clear, iterations
     )
     return fitted, covariance, residual

@@ -4,6 +4,9 @@ import pytest
 from board_rendering import photograph
 
 from calib.detection import Rejected, detect
+from calib.detection.charuco_fit import Guess, fit_charuco
+from calib.detection.grid import Grid
+from calib.detection.markers import on_board, place_by_markers
 from calib.views import Board
 
 BOARD = Board("charuco", 6, 4, 0.03, 0.022, "DICT_5X5_100")
@@ -41,6 +44,44 @@ def test_corners_beside_markers_are_as_good_as_any(blur_px):
     assert np.sqrt(np.square(error).mean()) < 0.025
     assert np.abs(error.mean(axis=0)).max() < 0.01
     assert found.frame_blur_px == pytest.approx(blur_px, rel=0.15)
+
+
+def test_blur_that_markers_cannot_be_read_through_costs_neither_the_board_nor_its_corners():
+    image, truth = photographed(3.5)
+    picture = photograph(image)
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
+    _, read, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(picture)
+    assert read is None or len(read) < 2
+    found = detect(picture, BOARD)
+    assert found, found.reason
+    error = found.corners_px - truth
+    assert np.sqrt(np.square(error).mean()) < 0.05
+    assert np.abs(error.mean(axis=0)).max() < 0.02
+    assert found.frame_blur_px == pytest.approx(3.5, rel=0.1)
+
+
+def test_markers_name_the_corners_of_a_turned_and_shifted_grid():
+    image, truth = photographed(2.0)
+    corners = truth.reshape(6, 4, 2)
+    whole = Grid(corners, first_dark=True)
+    picture = photograph(image).astype(np.float32)
+    part = Grid(corners[1:, 1:], first_dark=True).turned(1)
+    for grid, place in ((whole, (0, 0, 0)), (whole.turned(1), (3, 0, 0)), (part, (3, -1, -1))):
+        found = place_by_markers(picture, grid, BOARD)
+        assert found is not None
+        assert found.where == place
+        named = on_board(grid, found, BOARD).corners_px
+        known = np.isfinite(named)
+        np.testing.assert_allclose(named[known], corners[known])
+    assert place_by_markers(np.full_like(picture, 90.0), whole, BOARD) is None
+
+
+def test_corners_off_by_a_whole_square_are_turned_down():
+    image, truth = photographed(1.0)
+    aside = np.roll(truth.reshape(6, 4, 2), (1, 1), axis=(0, 1))
+    aside[0], aside[:, 0] = 2 * aside[1] - aside[2], 2 * aside[:, 1] - aside[:, 2]
+    seen = fit_charuco(photograph(image).astype(np.float32), Guess(aside), BOARD)
+    assert isinstance(seen, Rejected)
 
 
 def test_unseen_corners_are_nan_and_the_others_keep_their_names():

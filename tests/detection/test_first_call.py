@@ -3,10 +3,10 @@ import numpy as np
 import pytest
 from board_rendering import photograph, pose_homography, render_board
 
-from calib.detection import candidates, detect, lattice, make_ready, saddle
+from calib.detection import candidates, detect, lattice, make_ready, marks, saddle
 from calib.views import Board
 
-KERNELS = (candidates._rays, lattice._nearest_along, saddle._fit)
+KERNELS = (candidates._rays, lattice._nearest_along, marks._cover, saddle._fit)
 CHARUCO = Board("charuco", 6, 4, 0.03, 0.022, "DICT_5X5_100")
 
 
@@ -27,7 +27,9 @@ def test_once_made_ready_no_picture_and_no_board_compiles_anything_more():
     layout = cv2.aruco.CharucoBoard(
         (5, 7), 0.03, 0.022, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
     )
-    assert detect(layout.generateImage((500, 700), marginSize=40), CHARUCO)
+    drawn = layout.generateImage((500, 700), marginSize=40)
+    for picture in (drawn, cv2.GaussianBlur(drawn, (0, 0), 5.0)):
+        assert detect(picture, CHARUCO)
     assert compiled() == before
 
 
