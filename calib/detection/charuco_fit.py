@@ -35,8 +35,7 @@ FEWEST_CORNERS = 6
 # edges wider than this share of the free strip beside them reach into the markers
 _CROWDED = 0.25
 _STRAY_SQUARES = 0.1
-_MOST_PASSES = 14
-_MOST_RATIO = 0.9
+_MOST_PASSES = 12
 _IN_LINE_PX = 0.01
 _SMALL_SQUARE_PX = 12
 _TOO_BLURRED = "too blurred to tell the corners from the markers"
@@ -212,7 +211,6 @@ def _with_markers_in_line(
 ) -> FloatArray | None:
     """Fit parameters with the corners in line; None where fit and markers come to no agreement."""
     parameters = first
-    before_that: FloatArray | None = None
     for _ in range(_MOST_PASSES):
         before = parameters[..., [X, Y]]
         marks = _marks(image, parameters, board, layout)
@@ -221,11 +219,9 @@ def _with_markers_in_line(
         in_line = _in_line(fitted, doubt)
         if in_line is None:
             return None
-        parameters, move = in_line, in_line[..., [X, Y]] - before
-        parameters[..., [X, Y]] = before + move * _lengthened(move, before_that)
-        if np.abs(move).max() < _IN_LINE_PX:
+        parameters = in_line
+        if np.abs(parameters[..., [X, Y]] - before).max() < _IN_LINE_PX:
             return parameters
-        before_that = None if doubt.any() else move
     return None
 
 
@@ -237,18 +233,6 @@ def _in_line(fitted: Fitted, doubt: NDArray[np.bool_]) -> FloatArray | None:
     parameters = _mended(fitted, doubt, line)
     parameters[..., [X, Y]] = line
     return parameters
-
-
-def _lengthened(move: FloatArray, before: FloatArray | None) -> float:
-    """How many times a move the way is to where the next ones would end.
-
-    Markers drawn a little aside hold the corners back, so that the moves shrink by about the same
-    factor each time (Aitken 1926).
-    """
-    if before is None:
-        return 1.0
-    ratio = float((move * before).sum() / np.square(before).sum())
-    return 1.0 / (1.0 - ratio) if 0.0 < ratio < _MOST_RATIO else 1.0
 
 
 def _marks(

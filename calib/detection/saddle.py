@@ -224,7 +224,8 @@ def _gather(
     The window is the parallelogram of the lattice: |a|, |b| <= reach with p - c = a e1 + b e2,
     without the squares' middles, |a| and |b| > clear. A row of `pixels` is x, y, value, what
     neighbouring edges add to the two profiles, the share that the margin leaves of them, and
-    what slanted crossings and dark print nearby add to the pattern.
+    what slanted crossings and dark print nearby add to the pattern, and how the latter changes (2)
+    as the corner moves and takes the print along.
     """
     ax, ay, bx, by = steps
     det = ax * by - ay * bx
@@ -244,8 +245,14 @@ def _gather(
             if count == pixels.shape[0]:
                 return count
             pixels[count, 6] = _neighbour_slants(float(ix), float(iy), p, lines)
+            pixels[count, 7] = pixels[count, 8] = 0.0
             if marks.shape[0] > 0:
-                pixels[count, 6] -= 2.0 * marks[iy, ix] * (1.0 if p[CONTRAST] > 0 else -1.0)
+                double = 2.0 if p[CONTRAST] > 0 else -2.0
+                left, right = max(ix - 1, 0), min(ix + 1, width - 1)
+                above, below = max(iy - 1, 0), min(iy + 1, height - 1)
+                pixels[count, 6] -= double * marks[iy, ix]
+                pixels[count, 7] = double * (marks[iy, right] - marks[iy, left]) / (right - left)
+                pixels[count, 8] = double * (marks[below, ix] - marks[above, ix]) / (below - above)
             add1, left1 = _neighbour_edges(float(ix), float(iy), p[WIDTH], lines, 0)
             add2, left2 = _neighbour_edges(float(ix), float(iy), p[WIDTH], lines, 2)
             pixels[count, 0], pixels[count, 1], pixels[count, 2] = ix, iy, image[iy, ix]
@@ -255,12 +262,15 @@ def _gather(
 
 
 @_kernel
-def _normal_equations(p: Any, pixels: Any, count: int, shape: Any, A: Any, g: Any) -> float:
+def _normal_equations(
+    p: Any, pixels: Any, count: int, shape: Any, x0: float, y0: float, A: Any, g: Any
+) -> float:
     """Fill A = J^T J and g = J^T r; the sum of squared residuals is returned.
 
     `shape` holds the given (not fitted) terms: gradients of mean and contrast (4), curvatures
     of the two edges (2). Where the gradients' plane is pinned down moves with the corner; that
-    is not in J, since the fitted mean and contrast make it good.
+    is not in J, since the fitted mean and contrast make it good. The pixels were gathered with the
+    corner at (x0, y0).
     """
     A[:] = 0.0
     g[:] = 0.0
@@ -281,7 +291,8 @@ def _normal_equations(p: Any, pixels: Any, count: int, shape: Any, A: Any, g: An
         e1, e2 = e1 + pixels[i, 3], e2 + pixels[i, 4]
         z1, z2 = d1 / p[WIDTH], d2 / p[WIDTH]
         excess, by_z1, by_z2, by_rho = _slant(z1, z2, rho)
-        excess += pixels[i, 6]
+        print_x, print_y = pixels[i, 7], pixels[i, 8]
+        excess += pixels[i, 6] + print_x * (p[X] - x0) + print_y * (p[Y] - y0)
         left = pixels[i, 5]
         contrast = p[CONTRAST] + shape[2] * dx + shape[3] * dy
         profile = left * (e1 * e2 + excess) + (1.0 - left) * margin
@@ -289,12 +300,12 @@ def _normal_equations(p: Any, pixels: Any, count: int, shape: Any, A: Any, g: An
         cost += residual * residual
         J[CONTRAST] = profile
         first = CONTRAST
-        if slope1 != 0.0 or slope2 != 0.0:
+        if slope1 != 0.0 or slope2 != 0.0 or print_x != 0.0 or print_y != 0.0:
             pattern = left * contrast
             k1 = pattern * (slope1 * e2 + by_z1 / p[WIDTH])
             k2 = pattern * (slope2 * e1 + by_z2 / p[WIDTH])
-            J[X] = k1 * t1y + k2 * t2y
-            J[Y] = -k1 * t1x - k2 * t2x
+            J[X] = k1 * t1y + k2 * t2y + pattern * print_x
+            J[Y] = -k1 * t1x - k2 * t2x + pattern * print_y
             J[ANGLE_1] = -k1 * along1 + pattern * by_rho * sine
             J[ANGLE_2] = -k2 * along2 - pattern * by_rho * sine
             widening = (z1 * by_z1 + z2 * by_z2) / p[WIDTH]
@@ -312,7 +323,8 @@ def _minimise(p: Any, pixels: Any, count: int, shape: Any, A: Any, iterations: i
     """Levenberg-Marquardt from p, in place; the cost, or -1 where it breaks down."""
     g, trial, step = np.empty(PARAMETERS), np.empty(PARAMETERS), np.empty(PARAMETERS)
     A_trial, g_trial = np.empty((PARAMETERS, PARAMETERS)), np.empty(PARAMETERS)
-    cost = _normal_equations(p, pixels, count, shape, A, g)
+    x0, y0 = p[X], p[Y]
+    cost = _normal_equations(p, pixels, count, shape, x0, y0, A, g)
     damping = 1e-3
     for _ in range(iterations):
         if not _solve_damped(A, g, damping, step):
@@ -320,7 +332,7 @@ def _minimise(p: Any, pixels: Any, count: int, shape: Any, A: Any, iterations: i
         for k in range(PARAMETERS):
             trial[k] = p[k] + step[k]
         trial[WIDTH] = min(max(trial[WIDTH], 0.5 * p[WIDTH], 0.29), 2.0 * p[WIDTH])
-        new = _normal_equations(trial, pixels, count, shape, A_trial, g_trial)
+        new = _normal_equations(trial, pixels, count, shape, x0, y0, A_trial, g_trial)
         moved = abs(step[X]) + abs(step[Y])
         if new <= cost:
             for k in range(PARAMETERS):
@@ -355,7 +367,7 @@ def _fit(
     covariance = np.full((M, 2, 2), np.nan)
     residual = np.full(M, np.nan)
     A, step, unit = np.empty((PARAMETERS, PARAMETERS)), np.empty(PARAMETERS), np.empty(PARAMETERS)
-    pixels = np.empty((int((4.0 * reach_px + 8.0) ** 2), 7))
+    pixels = np.empty((int((4.0 * reach_px + 8.0) ** 2), 9))
     for i in range(M):
         p = fitted[i]
         if not math.isfinite(p.sum() + steps[i].sum()):

@@ -9,14 +9,14 @@ from calib.detection.grid import Grid
 from calib.detection.markers import on_board, place_by_markers
 from calib.views import Board
 
-BOARD = Board("charuco", 6, 4, 0.03, 0.022, "DICT_5X5_100")
+BOARD = Board("charuco", 6, 4, 0.03, 0.021, "DICT_5X5_100")
 OVERSAMPLING = 6
 
 
 def photographed(blur_px=1.0, *, legacy=False, shift=(0.0, 0.0)):
     """The board seen aslant, drawn by OpenCV and scaled down; and its true corners."""
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
-    layout = cv2.aruco.CharucoBoard((5, 7), 0.03, 0.022, dictionary)
+    layout = cv2.aruco.CharucoBoard((5, 7), 0.03, 0.021, dictionary)
     layout.setLegacyPattern(legacy)
     per_square = 70 * 4
     flat = layout.generateImage((5 * per_square, 7 * per_square), marginSize=0)

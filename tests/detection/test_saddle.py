@@ -7,11 +7,12 @@ from calib.detection import saddle
 def window(width, rng):
     """Pixels around a corner, in the kernel's own layout, with neighbours that mix in."""
     x, y = np.meshgrid(np.arange(30.0), np.arange(30.0))
-    pixels = np.zeros((x.size, 7))
+    pixels = np.zeros((x.size, 9))
     pixels[:, 0], pixels[:, 1] = x.ravel(), y.ravel()
     pixels[:, 2] = rng.uniform(0, 255, x.size)
     pixels[:, 3:5] = rng.uniform(-0.05, 0.05, (x.size, 2))
     pixels[:, 5] = rng.uniform(0.9, 1.0, x.size)
+    pixels[:, 7:9] = rng.uniform(-0.05, 0.05, (x.size, 2))
     return pixels, np.array([14.7, 15.2, 0.2, 1.45, width, 70.0, 120.0])
 
 
@@ -23,7 +24,7 @@ def test_gradient_of_the_cost_is_that_of_finite_differences(width):
     A, g = np.empty((7, 7)), np.empty(7)
 
     def cost(parameters):
-        return saddle._normal_equations(parameters, pixels, len(pixels), shape, A, g)
+        return saddle._normal_equations(parameters, pixels, len(pixels), shape, 14.5, 15.5, A, g)
 
     numeric = np.empty(7)
     for k in range(7):
