@@ -113,7 +113,7 @@ register(
     ),
 )
 register(
-    "thermal_mount_drift thermal_focal_drift",
+    "thermal_mount_drift thermal_focal_drift thermal_board_growth",
     Picture(
         order.drift,
         "The error moves steadily with time or temperature before, and not after.",

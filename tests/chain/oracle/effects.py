@@ -127,6 +127,19 @@ def _(p: Numbers, scene: Scene) -> None:
         scene.fixed = anp.dot(scene.fixed, formulas.rigid(_six(p)))
 
 
+@_of("thermal_board_growth")
+def _(p: Numbers, scene: Scene) -> None:
+    """The board as large as it was, nearer along the ray to its middle."""
+    pose = scene.pose()
+    middle = anp.dot(pose[:3, :3], anp.mean(scene.points, axis=0)) + pose[:3, 3]
+    nearer = middle * (1.0 / (1.0 + p["relative"] * _warmth(p, scene)) - 1.0)
+    moved = anp.dot(formulas.rigid(anp.concatenate([nearer, np.zeros(3)])), pose)
+    if scene.views.mount == "eye_in_hand":
+        scene.fixed = anp.dot(scene.camera, moved)
+    else:
+        scene.mounted = anp.dot(anp.linalg.inv(scene.flange), anp.dot(scene.fixed, moved))
+
+
 @_of("board_scale")
 def _(p: Numbers, scene: Scene) -> None:
     scene.points = scene.points + p["relative"] * scene.points
