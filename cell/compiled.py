@@ -3,10 +3,16 @@
 The first use on a machine compiles; later ones load what was kept beside the code or, where that
 folder is read-only, in the user's cache. Where neither can be written numba would refuse to start,
 so a folder for temporary files serves.
+
+numba compiles a function anew when its own file has changed, and not when the file of one that it
+calls has. After an upgrade the old physics would go on inside of what was kept: so everything kept
+is forgotten when any file with compiled code is another one than before.
 """
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import os
 import stat
 import sys
@@ -19,6 +25,8 @@ VERBS = ("run", "bootstrap", "plan", "simulate", "calibrate", "diagnose", "verif
 """Those that cannot do without compiled code."""
 
 _CODE = Path(__file__).parents[1] / "calib"
+_ROOMS = (_CODE, _CODE.with_name("sim"))
+_MARK = "calibration-cell.kernels"
 _KEPT = "accumulate._accumulate-*.nbi"
 
 
@@ -43,6 +51,7 @@ def prepare(arguments: Sequence[str]) -> None:
         own = _own_folder()
         if own is not None:
             os.environ[VARIABLE] = str(own)
+    forget_stale()
     asked = next(iter(arguments), "")
     if asked in VERBS and "--help" not in arguments and not _kept():
         sys.stderr.write(
@@ -51,10 +60,36 @@ def prepare(arguments: Sequence[str]) -> None:
         sys.stderr.flush()
 
 
+def forget_stale() -> None:
+    """Forget what was compiled from other files than those that are here now."""
+    code = {
+        path: path.read_bytes()
+        for room in _ROOMS
+        for path in sorted(room.rglob("*.py"))
+        if b"njit" in path.read_bytes()
+    }
+    now = hashlib.sha256(b"".join(code.values())).hexdigest()
+    for folder in _folders():
+        mark = folder / _MARK
+        with contextlib.suppress(OSError):
+            if mark.is_file() and mark.read_text(encoding="ascii") == now:
+                continue
+            folder.mkdir(parents=True, exist_ok=True)
+            for path in code:
+                for kept in folder.rglob(f"{path.stem}.*.nbi"):
+                    kept.unlink(missing_ok=True)
+            mark.write_text(now, encoding="ascii")
+
+
 def _kept() -> bool:
-    user = Path.home() / ".cache" / "numba"
-    folders = [Path(os.environ[VARIABLE])] if VARIABLE in os.environ else [_CODE, user]
-    return any(next(folder.rglob(_KEPT), None) is not None for folder in folders)
+    return any(next(folder.rglob(_KEPT), None) is not None for folder in _folders())
+
+
+def _folders() -> list[Path]:
+    """Where numba keeps compiled code now: beside the code, if it can be written there."""
+    if VARIABLE in os.environ:
+        return [Path(os.environ[VARIABLE])]
+    return list(_ROOMS) if writable(_CODE) else [Path.home() / ".cache" / "numba"]
 
 
 def _own_folder() -> Path | None:

@@ -9,6 +9,10 @@ from collections.abc import Generator
 
 import pytest
 
+from cell.compiled import forget_stale
+
+forget_stale()
+
 MAY_SKIP = (
     "all tests already run as an ordinary user",
     "an ordinary user may not read",

@@ -35,6 +35,7 @@ OPTICS: tuple[str, ...] = (
     "sweep_ry_rad",
     "sweep_rz_rad",
     "height_px",
+    "pose_row",
 )
 """Names of the K columns of an optics array.
 
@@ -43,7 +44,8 @@ sensor's tilt are Brown's and OpenCV's distortion on normalised coordinates. `pu
 the entrance pupil along the axis by that much per squared radian of field angle; `window_m` is
 the thickness of a plane-parallel glass of index `WINDOW_INDEX` in front of the lens. The sweep is
 how the board moves in the camera's frame while a rolling shutter reads from the first row to the
-last of `height_px` rows.
+last of `height_px` rows; `pose_row` is how far below the middle, as a share of the rows, the row
+lies at whose moment the pose stands.
 """
 
 COLUMN = {name: index for index, name in enumerate(OPTICS)}

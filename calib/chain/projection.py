@@ -23,7 +23,7 @@ NOTHING, BROWN, EVERYTHING = 0, 1, 2
 by every column. The rare ones (tilt, pupil, window, sweep) cost more than all others together."""
 
 FIRST_RARE, LAST_RARE = COLUMN["tilt_x_rad"], COLUMN["sweep_rz_rad"]
-FIRST_SWEEP, HEIGHT = COLUMN["sweep_x_m"], COLUMN["height_px"]
+FIRST_SWEEP, HEIGHT, POSE_ROW = COLUMN["sweep_x_m"], COLUMN["height_px"], COLUMN["pose_row"]
 ROW_STEPS, ROW_SETTLED_PX = 40, 1e-11
 """A board that moves by a tenth of the picture while it is read needs about a dozen steps."""
 
@@ -182,7 +182,7 @@ def _corner(o, tilt, pose, px, py, pz, uv, j_pose, j_optics, shift, jt, derive):
     j_optics[1, 19] = vs * shift[3]
     j_optics[0, 20] = us * shift[4]
     j_optics[1, 20] = vs * shift[4]
-    late = uv[1] / o[HEIGHT] - 0.5
+    late = uv[1] / o[HEIGHT] - 0.5 - o[POSE_ROW]
     for k in range(6):
         j_optics[0, FIRST_SWEEP + k] = j_pose[0, k] * late
         j_optics[1, FIRST_SWEEP + k] = j_pose[1, k] * late
@@ -220,7 +220,7 @@ def _swept(o, tilt, pose, px, py, pz, uv, j_pose, j_optics, shift, jt, derive): 
     late = 0.0
     for _ in range(ROW_STEPS):
         row = uv[1]
-        late = row / o[HEIGHT] - 0.5
+        late = row / o[HEIGHT] - 0.5 - o[POSE_ROW]
         xs, ys, zs = x + late * mx, y + late * my, z + late * mz
         _corner(o, tilt, UNIT, xs, ys, zs, uv, j_pose, j_optics, shift, jt, NOTHING)
         if abs(uv[1] - row) < ROW_SETTLED_PX:

@@ -38,6 +38,9 @@ _EXCHANGE = 2.0
 
 _EXCHANGED_AGAINST = 3
 
+_TIED, _MOST_TIED = 0.5, 2
+"""Shapes of one effect that promise as much as the best are fitted in earnest, so many at most."""
+
 _SCORE_FALLS_SHORT = 5.0
 """A fit in earnest has gained up to about this many times what its score test promised."""
 
@@ -167,9 +170,31 @@ class Search:
                 self._settle(trial.fit)
                 return True
             if demand >= DEMAND:
+                candidate, trial = self._best_of_tied(fit, candidate, trial)
+                demand = self.best.criterion - trial.criterion
                 self._record(candidate, trial, demand, trials[at + 1 :])
                 return True
         return False
+
+    def _best_of_tied(
+        self, fit: JointFit, candidate: Candidate, trial: Trial
+    ) -> tuple[Candidate, Trial]:
+        """The best of an effect's shapes that its score tests cannot tell apart.
+
+        As long as a large effect is missing the arm's scatter seems so large that its poses say
+        nothing: from which row on a rolling shutter's pose counts shows only in a fit.
+        """
+        alike = [c for c in candidates(fit.model, self.views) if c.effect == candidate.effect]
+        scores = score_effects(fit, self.views, [c.present for c in alike])
+        picked = [self._picked(c, s) for c, s in zip(alike, scores, strict=True)]
+        promise = [self._promise(*pair) for pair in picked]
+        tied = [
+            one
+            for (one, _), worth in zip(picked, promise, strict=True)
+            if worth > max(promise) - _TIED and not one.present.same_but_amounts(candidate.present)
+        ]
+        best = [(candidate, trial), *self.earnest(fit, tied[:_MOST_TIED])]
+        return min(best, key=lambda pair: pair[1].criterion)
 
     def _record(
         self,

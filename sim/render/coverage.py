@@ -8,7 +8,6 @@ from numba import njit
 from sim.render.pattern import BACKGROUND, Pattern, leaf
 from sim.render.surface import NODE_STEP_PX, Image, Nodes
 
-# numba's cache notices changes of this file only: touch it after changing `leaf` or the step.
 STEP = NODE_STEP_PX
 
 _SAMPLES = 1024

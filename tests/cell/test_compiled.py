@@ -39,3 +39,22 @@ def test_a_read_only_installation_without_a_home_keeps_code_in_a_folder_of_its_o
     folder.chmod(0o777)
     compiled.prepare(["doctor"])
     assert compiled.VARIABLE not in os.environ
+
+
+def test_what_was_compiled_from_other_files_is_forgotten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(compiled.VARIABLE, str(tmp_path))
+    compiled.forget_stale()
+    ours = tmp_path / "solver_0a1b" / "accumulate._accumulate-72.py311.nbi"
+    other = tmp_path / "elsewhere" / "somebody.kernel-1.py311.nbi"
+    for kept in (ours, other):
+        kept.parent.mkdir()
+        kept.touch()
+    compiled.forget_stale()
+    assert ours.exists()
+    (mark,) = tmp_path.glob("*.kernels")
+    mark.write_text("of an older version", encoding="ascii")
+    compiled.forget_stale()
+    assert not ours.exists()
+    assert other.exists()

@@ -19,7 +19,7 @@ RNG = np.random.default_rng(4)
 POINTS = np.column_stack([RNG.uniform(-0.15, 0.15, (12, 2)), RNG.uniform(-0.02, 0.02, 12)])
 POSES = compose(RNG.normal(0, 0.4, (3, 3)), np.array([[0, 0, 0.5], [0.05, 0, 0.4], [0, 0.1, 0.9]]))
 SWEEP = [name for name in OPTICS if name.startswith("sweep")]
-DIFFERENTIABLE = [n for n in OPTICS if n != "height_px"]
+DIFFERENTIABLE = [n for n in OPTICS if n not in ("height_px", "pose_row")]
 
 
 def _lens(**more: float) -> FloatArray:
@@ -61,7 +61,8 @@ def _independent(row: FloatArray, pose: FloatArray, point: FloatArray) -> Callab
 
     def function(values: object, increment: object) -> object:
         o = dict(zip(DIFFERENTIABLE, values, strict=True))  # type: ignore[call-overload]
-        o["height_px"] = row[COLUMN["height_px"]]
+        for fixed in ("height_px", "pose_row"):
+            o[fixed] = row[COLUMN[fixed]]
         before = anp.array(pose[:3, :3] @ point + pose[:3, 3])
         moved = formulas.camera_coordinates(formulas.rigid(increment), before)
         return formulas.swept_pixel(o, moved)
@@ -77,7 +78,7 @@ LENSES = {
     "everything": _lens(
         skew_px=1.0, tilt_x_rad=0.02, tilt_y_rad=0.03, pupil_m_rad2=0.01, window_m=0.004
     ),
-    "swept": _lens(tilt_x_rad=0.02, window_m=0.004, **MOTION),
+    "swept": _lens(tilt_x_rad=0.02, window_m=0.004, pose_row=-0.3, **MOTION),
 }
 
 
@@ -96,11 +97,14 @@ def test_every_derivative_is_that_of_automatic_differentiation(lens: str) -> Non
             by_pose = autograd.jacobian(function, 1)(values, np.zeros(6))
             assert np.allclose(j_optics[i, j][:, columns], by_optics, rtol=1e-7, atol=1e-5)
             assert np.allclose(j_pose[i, j], by_pose, rtol=1e-9, atol=1e-7)
-    assert np.all(j_optics[..., COLUMN["height_px"]] == 0.0)
+    assert np.all(j_optics[..., [COLUMN["height_px"], COLUMN["pose_row"]]] == 0.0)
 
 
-def test_a_rolling_shutter_shows_a_corner_where_it_is_when_its_row_is_read() -> None:
-    row = _lens()
+@pytest.mark.parametrize("pose_row", [0.0, -0.5])
+def test_a_rolling_shutter_shows_a_corner_where_it_is_when_its_row_is_read(
+    pose_row: float,
+) -> None:
+    row = _lens(pose_row=pose_row)
     still = project(_repeated(row), POSES, POINTS)
     sweep = np.array([0.002, -0.001, 0.003, 0.004, 0.001, -0.002])
     row[[COLUMN[name] for name in SWEEP]] = sweep
@@ -108,7 +112,7 @@ def test_a_rolling_shutter_shows_a_corner_where_it_is_when_its_row_is_read() -> 
     row[[COLUMN[name] for name in SWEEP]] = 0.0
     for i, pose in enumerate(POSES):
         for j, point in enumerate(POINTS):
-            late = swept[i, j, 1] / 1500.0 - 0.5
+            late = swept[i, j, 1] / 1500.0 - 0.5 - pose_row
             there = from_vector(sweep * late) @ pose
             true = project(row[None], there[None], point[None])[0, 0]
             # straight on instead of around: second order of an angle of a milliradian or two

@@ -31,7 +31,9 @@ MOUNTS: tuple[Mount, ...] = ("eye_in_hand", "eye_to_hand")
 SHARE = 3e-5
 """Rounding in differences of pixels is up to 5e-6 of a derivative; a term left out is far more."""
 LENS = ("alpha_px", "beta_px", "u0_px", "v0_px", "k1", "k2")
-WHOLE_LENS = tuple(c for c in OPTICS if c != "height_px" and not c.startswith("sweep"))
+WHOLE_LENS = tuple(
+    c for c in OPTICS if c not in ("height_px", "pose_row") and not c.startswith("sweep")
+)
 
 
 def _pixels_by(found: Dependence) -> tuple[FloatArray, FloatArray]:

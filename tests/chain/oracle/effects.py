@@ -266,3 +266,4 @@ def _(p: Numbers, scene: Scene) -> None:
     for k, name in enumerate(formulas.SWEEP):
         _add(scene, name, p["readout_s"] * speed[k])
     scene.optics["height_px"] = scene.views.height_px
+    scene.optics["pose_row"] = p["pose_at_row"] - 0.5

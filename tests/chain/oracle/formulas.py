@@ -99,5 +99,6 @@ def swept_pixel(o: dict[str, Array], p: Array) -> Array:
     motion = along + anp.dot(cross_matrix(sweep[3:]), p)
     seen = pixel(o, p)
     for _ in range(12 if plain(sweep).any() else 1):
-        seen = pixel(o, p + (seen[1] / o["height_px"] - 0.5) * motion)
+        late = seen[1] / o["height_px"] - 0.5 - o["pose_row"]
+        seen = pixel(o, p + late * motion)
     return seen
