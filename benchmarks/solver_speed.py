@@ -67,7 +67,8 @@ def observed(frames: int) -> tuple[FloatArray, FloatArray]:
     poses[:, :3, 3] = aim * distance[:, None] - poses[:, :3, :3] @ BOARD.corners_m.mean(axis=0)
     optics = np.repeat(TRUE[None], frames, axis=0)
     corners = project(optics, poses, BOARD.corners_m)
-    return corners + rng.normal(0, 0.1, corners.shape), poses
+    corners += rng.normal(0, 0.1, corners.shape)
+    return corners, poses
 
 
 def start(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
