@@ -2,8 +2,10 @@
 
     python -m benchmarks.corners            # 1279 x 724, blur 0 to 6 px, Gaussian and disk
     python -m benchmarks.corners --large    # 4096 x 3072
+    python -m benchmarks.corners --charuco  # ChArUco boards, with either size
 
-CPU seconds are of all threads. The bound is Cramer-Rao's for a known pattern.
+CPU seconds are of all threads. The bound is Cramer-Rao's for a known pattern; for ChArUco boards
+in the cross that runs free of print between the markers.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from benchmarks.corner_pictures import (
     views,
 )
 from calib.detection import detect, make_ready
+from calib.detection.markers import layouts
 from calib.views import Board, FloatArray
 
 Finder = Callable[[Image, Board], "FloatArray | None"]
@@ -87,13 +90,24 @@ def sector_based(flags: int) -> Finder:
     return find
 
 
+def of_markers(image: Image, board: Board) -> FloatArray | None:
+    """OpenCV's ChArUco detector; NaN where it saw no corner, None below six."""
+    corners, ids, _, _ = cv2.aruco.CharucoDetector(layouts(board)[0]).detectBoard(image)
+    if ids is None or len(ids) < 6:
+        return None
+    found = np.full((board.corner_count, 2), np.nan)
+    found[ids.ravel()] = corners.reshape(-1, 2)
+    return found
+
+
 def error_px(found: FloatArray, view: View) -> FloatArray:
-    """(M, 2) error in the order, mirrored ones too, that suits the truth best."""
+    """(K, 2) error of the corners seen, in the order, mirrored ones too, that suits best."""
     board = view.board
     grid = found.reshape(board.rows, board.cols, 2)
     turned = [np.rot90(g, k) for g in (grid, grid[:, ::-1]) for k in range(4)]
     errors = [t.reshape(-1, 2) - view.truth_px for t in turned if t.shape == grid.shape]
-    return min(errors, key=lambda error: float(np.square(error).sum()))
+    best = min(errors, key=lambda error: float(np.nansum(np.square(error))))
+    return best[np.isfinite(best[:, 0])]
 
 
 def compare(set_of_views: list[View], soft: Softness, finders: dict[str, Finder]) -> None:
@@ -124,6 +138,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--large", action="store_true", help="4096 x 3072 instead of 1279 x 724")
     parser.add_argument("--views", type=int, default=6, help="poses for each board")
+    parser.add_argument("--charuco", action="store_true", help="ChArUco boards, not chessboards")
     parser.add_argument("--ours-only", action="store_true", help="leave OpenCV out")
     parser.add_argument(
         "--classic-at-any-blur",
@@ -131,24 +146,35 @@ def main() -> None:
         help="findChessboardCorners on large blurred pictures too, minutes for some",
     )
     arguments = parser.parse_args()
-    size, squares = ((4096, 3072), (150, 80)) if arguments.large else ((1279, 724), (47, 24))
+    size = (4096, 3072) if arguments.large else (1279, 724)
     print(
         f"{size[0]} x {size[1]}, contrast {CONTRAST:g}, noise {NOISE:g}, OpenCV {cv2.__version__}"
     )
     heads = f"{'found':>6s} {'RMS px':>8s} {'/bound':>6s} {'bias':>7s} {'CPU s':>7s} {'worst':>8s}"
     print(f"    {'finder':28s} {heads}")
     make_ready()
-    for (rows, cols), square_px in zip(((7, 10), (14, 14)), squares, strict=True):
-        board = Board("chessboard", rows, cols, 0.025)
+    for board, square_px in boards(large=arguments.large, charuco=arguments.charuco):
         seen = list(views(board, square_px, size, arguments.views))
         for sigma_px, disk in ((0, False), (1, False), (3, False), (6, False), (3, True)):
             finders: dict[str, Finder] = {"this project": ours}
-            if not arguments.ours_only:
+            if not arguments.ours_only and arguments.charuco:
+                finders["ChArUco"] = of_markers
+            elif not arguments.ours_only:
                 if not arguments.large or sigma_px < 2 or arguments.classic_at_any_blur:
                     finders["findChessboardCorners+SubPix"] = classic
                 finders["SB"] = sector_based(0)
                 finders["SB exhaustive, accuracy"] = sector_based(EXACT)
             compare(seen, Softness(sigma_px, disk), finders)
+
+
+def boards(*, large: bool, charuco: bool) -> list[tuple[Board, float]]:
+    """The boards, and how large their squares are seen, pixels."""
+    if charuco:
+        few = Board("charuco", 6, 8, 0.03, 0.022, "DICT_5X5_100")
+        many = Board("charuco", 10, 13, 0.03, 0.0225, "DICT_4X4_250")
+        return [(few, 150), (many, 80)] if large else [(few, 47), (many, 30)]
+    few, many = (Board("chessboard", rows, cols, 0.025) for rows, cols in ((7, 10), (14, 14)))
+    return [(few, 150), (many, 80)] if large else [(few, 47), (many, 24)]
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ _RUNNER_UP = 0.85
 # a guess that gives this share of the corners is not followed by others
 _ENOUGH = 0.8
 # the reader takes seconds for some pictures of twelve megapixels
-_READ_PIXELS = 4e6
+_READ_PIXELS = 2e6
 
 
 def _eight_bit(image: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -61,7 +61,12 @@ def _expected_corners(
 def _by_reading(image: NDArray[np.float32], board: Board) -> Guess | Rejected:
     """Where the markers that can be read say the corners are, seen or not."""
     drawn = layouts(board)
-    detector = cv2.aruco.ArucoDetector(drawn[0].getDictionary())
+    dictionary = drawn[0].getDictionary()
+    settings = cv2.aruco.DetectorParameters()
+    # cells of less than two pixels cannot be read, but looking at all such specks takes seconds
+    least_side_px = 2 * (dictionary.markerSize + 2)
+    settings.minMarkerPerimeterRate = 4 * least_side_px / max(image.shape)
+    detector = cv2.aruco.ArucoDetector(dictionary, settings)
     marker_corners, marker_ids, _ = detector.detectMarkers(_eight_bit(image))
     if marker_ids is None or len(marker_ids) < _FEWEST_MARKERS:
         return Rejected("fewer than two of the board's markers were read")
@@ -87,13 +92,13 @@ def _by_lattice(image: NDArray[np.float32], board: Board) -> Guess | None:
 
 def _guesses(image: NDArray[np.float32], board: Board) -> Iterator[Guess | Rejected]:
     """Where the corners may be in the full image, one guess after the other."""
-    sizes = scales(image.shape)
     readable = next(s for s in (1.0, 0.5, 0.25, 0.125) if image.size * s * s <= _READ_PIXELS)
-    for scale in (readable, *sizes):
-        small = scaled(image, scale)
-        found = _by_reading(small, board) if scale == readable else _by_lattice(small, board)
-        if found is not None:
-            yield found if isinstance(found, Rejected) else found.enlarged(scale)
+    read = _by_reading(scaled(image, readable), board)
+    yield read if isinstance(read, Rejected) else read.enlarged(readable)
+    for scale in scales(image.shape):
+        held = _by_lattice(scaled(image, scale), board)
+        if held is not None:
+            yield held.enlarged(scale)
 
 
 def find_charuco(

@@ -100,7 +100,7 @@ def fit_charuco(image: NDArray[np.float32], guess: Guess, board: Board) -> Seen 
     clear = 0.45 * (1 - _marker_share(board))
     start = starts(image, expected, aside=0.7 * clear)
     even_dark = float(np.nanmedian(_of_even_corner(start))) > 0
-    first = fit_grid(image, start, clear=clear)
+    first = fit_grid(image, start, clear=clear, iterations=6)
     doubt = doubtful(first, expected, even_dark)
     doubt |= _strays(first.corners_px, doubt)
     layout = guess.layout
@@ -117,7 +117,7 @@ def fit_charuco(image: NDArray[np.float32], guess: Guess, board: Board) -> Seen 
     elif (~doubt).sum() < FEWEST_CORNERS:
         return Rejected(f"only {int((~doubt).sum())} of {doubt.size} corners are seen")
     else:
-        fine = fit_closely(image, _mended(first, doubt, expected), rough=False, clear=clear)
+        fine = fit_closely(image, _mended(first, doubt, expected), rough=True, clear=clear)
         doubt |= doubtful(fine, expected, even_dark)
     doubt |= _strays(fine.corners_px, doubt)
     if (~doubt).sum() < FEWEST_CORNERS:
