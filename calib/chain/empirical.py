@@ -178,6 +178,10 @@ def covariate_named(name: str) -> Covariate:
     return {covariate.name: covariate for covariate in COVARIATES}[name]
 
 
+def _goes_round(covariate: Covariate, low: float, high: float) -> bool:
+    return covariate.cyclic and high - low > np.pi
+
+
 def basis(
     covariate: Covariate, value: FloatArray, low: float, high: float, times: int = 1
 ) -> FloatArray:
@@ -191,10 +195,11 @@ def basis(
         return np.asarray(safe * known[:, None])
     if covariate.name.startswith("approach"):
         return np.asarray(safe * known)[:, None]
-    if covariate.cyclic and high - low > np.pi:
+    if _goes_round(covariate, low, high):
         waves = [f(k * safe) for k in range(1, times * HARMONICS + 1) for f in (np.sin, np.cos)]
         return np.asarray(np.stack(waves, axis=1) * known[:, None])
-    unit = np.clip(2.0 * (safe - low) / max(high - low, 1e-12) - 1.0, -1.2, 1.2)
+    beyond = 1.2 if times == 1 else 1.0  # higher powers run away outside of what was seen
+    unit = np.clip(2.0 * (safe - low) / max(high - low, 1e-12) - 1.0, -beyond, beyond)
     return np.asarray(legvander(unit, times * LEGENDRE_TERMS)[:, 1:] * known[:, None])
 
 
@@ -243,6 +248,16 @@ class Curve:
             return functions
         return np.concatenate([functions, np.ones((len(functions), 1))], axis=1)
 
+    def usual(self, function: int) -> float:
+        """How large an amount of that function usually is, as a share of the first one's.
+
+        Those that only a fine curve has fall off with their order, somewhat slower than a kink's do:
+        where no frame is they would swing.
+        """
+        waves = _goes_round(self.covariate, self.low, self.high)
+        order, smooth = (function // 2, HARMONICS) if waves else (function, LEGENDRE_TERMS)
+        return 1.0 if not self.fine or order < smooth else (1.0 + order) ** -1.5
+
 
 _OWN_CONSTANT = ("joint_2", "joint_3", "joint_4", "joint_5")
 
@@ -272,7 +287,7 @@ def empirical(curve: Curve, functions: int) -> Effect:
         source="varying-coefficient model (Hastie, Tibshirani 1993)",
         parameters=(
             *(
-                Parameter(f"c{b}_{name}", unit, typical, -1e3, 1e3)
+                Parameter(f"c{b}_{name}", unit, typical * curve.usual(b), -1e3, 1e3)
                 for b in range(functions)
                 for name, unit, typical in site.components
             ),
