@@ -244,19 +244,26 @@ class Curve:
         board absorbs: a curve that only starts at some angle has one, too.
         """
         functions = self.functions(walk)
-        if self.site.name not in _OWN_CONSTANT or self.covariate is CONSTANT:
+        if not self.has_own_constant:
             return functions
         return np.concatenate([functions, np.ones((len(functions), 1))], axis=1)
 
-    def usual(self, function: int) -> float:
-        """How large an amount of that function usually is, as a share of the first one's.
+    @property
+    def has_own_constant(self) -> bool:
+        """Whether the last of the functions that carry it is a constant."""
+        return self.site.name in _OWN_CONSTANT and self.covariate is not CONSTANT
 
-        Those that only a fine curve has fall off with their order, somewhat slower than a kink's do:
+    def usual(self, function: int, functions: int) -> float:
+        """How large an amount of one of the functions usually is, as a share of the first one's.
+
+        Those that only a fine curve has fall off with the square of their order, as a kink's do:
         where no frame is they would swing.
         """
+        if self.has_own_constant and function == functions - 1:
+            return 1.0
         waves = _goes_round(self.covariate, self.low, self.high)
         order, smooth = (function // 2, HARMONICS) if waves else (function, LEGENDRE_TERMS)
-        return 1.0 if not self.fine or order < smooth else (1.0 + order) ** -1.5
+        return 1.0 if not self.fine or order < smooth else (1.0 + order) ** -2.0
 
 
 _OWN_CONSTANT = ("joint_2", "joint_3", "joint_4", "joint_5")
@@ -287,7 +294,7 @@ def empirical(curve: Curve, functions: int) -> Effect:
         source="varying-coefficient model (Hastie, Tibshirani 1993)",
         parameters=(
             *(
-                Parameter(f"c{b}_{name}", unit, typical * curve.usual(b), -1e3, 1e3)
+                Parameter(f"c{b}_{name}", unit, typical * curve.usual(b, functions), -1e3, 1e3)
                 for b in range(functions)
                 for name, unit, typical in site.components
             ),
