@@ -38,6 +38,9 @@ _EXCHANGE = 2.0
 
 _EXCHANGED_AGAINST = 3
 
+_BETTER = 1.0
+"""What a fit from another start must lower the criterion by to be another optimum."""
+
 _TIED, _MOST_TIED = 0.5, 2
 """Shapes of one effect that promise as much as the best are fitted in earnest, so many at most."""
 
@@ -95,7 +98,21 @@ class Search:
                 pass
             if not self._exchange():
                 break
+        self._begin_at_rest()
         return self.best.fit
+
+    def _begin_at_rest(self) -> None:
+        """Fit once more with no frame off at first, and keep what is better.
+
+        A focus drive's play jumps where a frame is as far as the one before: one that an earlier
+        fit has pushed to the wrong side does not come back by small steps.
+        """
+        fit = self.best.fit
+        if not fit.model.effects:
+            return
+        rested = self._trial(self.fitter.fit(fit.model, fit.noise, None, fit.weight))
+        if rested.criterion < self.best.criterion - _BETTER:
+            self._settle(rested.fit)
 
     def ranked(self, fit: JointFit) -> list[tuple[Candidate, Score]]:
         """Score every candidate, the best shape of each effect only, best first."""
