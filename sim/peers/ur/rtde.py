@@ -79,8 +79,10 @@ class RtdeServer:
 
     def _handle(self, client: _Client, kind: int, payload: bytes) -> None:
         if kind == Frame.DATA_PACKAGE:
-            recipe = client.inputs[payload[0] - 1]
-            self._controller.write_inputs(recipe.unpack(payload[1:]))
+            # a client that did not get its registers may write to them all the same
+            if 1 <= payload[0] <= len(client.inputs):
+                recipe = client.inputs[payload[0] - 1]
+                self._controller.write_inputs(recipe.unpack(payload[1:]))
             return
         answer = self._answer(client, kind, payload)
         if not self._controller.mute:

@@ -71,6 +71,16 @@ def holding_registers(address):
         yield
 
 
+def test_the_peer_overlooks_what_a_client_writes_without_registers_of_its_own():
+    with (
+        ur_peer() as (controller, _),
+        socket.create_connection((controller.address, RTDE_PORT)) as link,
+    ):
+        link.sendall(encode(Frame.DATA_PACKAGE, b"\x0b\x00\x00\x00\x00"))
+        link.sendall(encode(Frame.GET_CONTROLLER_VERSION))
+        assert receive(link)[0] == Frame.GET_CONTROLLER_VERSION
+
+
 def test_a_program_that_is_not_ours_is_left_running():
     with ur_moving() as (_, controller, sim):
         with pytest.raises(DeviceRefused, match="program is running"):
