@@ -62,12 +62,8 @@ def prepare(arguments: Sequence[str]) -> None:
 
 def forget_stale() -> None:
     """Forget what was compiled from other files than those that are here now."""
-    code = {
-        path: path.read_bytes()
-        for room in _ROOMS
-        for path in sorted(room.rglob("*.py"))
-        if b"njit" in path.read_bytes()
-    }
+    files = (path for room in _ROOMS for path in sorted(room.rglob("*.py")))
+    code = {path: text for path in files if b"njit" in (text := path.read_bytes())}
     now = hashlib.sha256(b"".join(code.values())).hexdigest()
     for folder in _folders():
         mark = folder / _MARK

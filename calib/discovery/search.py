@@ -202,6 +202,8 @@ class Search:
         nothing: from which row on a rolling shutter's pose counts shows only in a fit.
         """
         alike = [c for c in candidates(fit.model, self.views) if c.effect == candidate.effect]
+        if len(alike) == 1:
+            return candidate, trial
         scores = score_effects(fit, self.views, [c.present for c in alike])
         picked = [self._picked(c, s) for c, s in zip(alike, scores, strict=True)]
         promise = [self._promise(*pair) for pair in picked]
