@@ -36,6 +36,9 @@ class Parameter:
         zero (a time constant). `setting`: given, never fitted (a node's place).
     identifiable:
         False where hand-eye or board pose absorb it, so that it can be simulated but not fitted.
+    prior_sigma:
+        Width of the normal prior of an amount whose sizes spread far beyond the typical one; None
+        where ten times the typical size is wide enough.
     """
 
     name: str
@@ -45,6 +48,7 @@ class Parameter:
     high: float
     role: Role = "amount"
     identifiable: bool = True
+    prior_sigma: float | None = None
 
 
 def _one_candidate(views: Views) -> Sequence[Mapping[str, float]]:

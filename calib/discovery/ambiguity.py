@@ -35,6 +35,17 @@ _EXPERIMENTS = {
     frozenset({"mount_slip", "board_slip"}): (
         "repeat the first poses at the end, turned by 90 degrees about the optical axis"
     ),
+    frozenset({"base_compliance", "joint_compliance"}): (
+        "the same poses with joint 1 turned by 90 degrees: a pedestal tilts about its own axes; or"
+        " a level on the base while the arm stretches out"
+    ),
+    frozenset({"optics_step", "mount_slip"}): (
+        "repeat the first poses at the end, near and far: a lens that was touched scales the"
+        " picture at every distance alike"
+    ),
+    frozenset({"base_drift", "board_slip"}): (
+        "repeat the first poses at the end and midway: a slip happens once, a drift goes on"
+    ),
 }
 _GENERAL = "more views in which the two differ: the plan of `separate_with`, if there is one"
 

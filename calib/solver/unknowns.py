@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.chain import rigid
-from calib.chain.effect import Present
+from calib.chain.effect import Parameter, Present
 from calib.chain.kinematics import ArmKinematics
 from calib.chain.model import CellModel, Journey
 from calib.chain.optics import COLUMN
@@ -43,6 +43,10 @@ class Unknown:
     prior_sigma: float = np.inf
 
 
+def _prior_sigma(parameter: Parameter) -> float:
+    return parameter.prior_sigma or PRIOR_WIDTH * parameter.typical
+
+
 def _free_of(present: Present, at: int) -> list[Unknown]:
     effect = present.effect
     return [
@@ -51,7 +55,7 @@ def _free_of(present: Present, at: int) -> list[Unknown]:
             p.unit,
             p.typical,
             ("effect", at, k),
-            PRIOR_WIDTH * p.typical if p.role == "amount" else np.inf,
+            _prior_sigma(p) if p.role == "amount" else np.inf,
         )
         for k, p in enumerate(effect.parameters)
         if p.role != "setting" and p.identifiable and k not in present.held

@@ -22,7 +22,7 @@ MUST_HAVE = {
     *("board_warp", "board_scale", "board_shear", "board_slip", "focus_breathing"),
     *("focus_hysteresis", "thermal_focal_drift", "decentering", "higher_order_radial"),
     *("distance_dependent_distortion", "entrance_pupil_shift", "protective_window", "lens_sag"),
-    *("sensor_tilt", "rolling_shutter"),
+    *("sensor_tilt", "rolling_shutter", "optics_step", "base_compliance", "base_drift"),
 }
 
 

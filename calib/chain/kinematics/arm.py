@@ -8,7 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calib.chain.kinematics import dh as chain
-from calib.chain.kinematics.gravity import STANDARD_GRAVITY_M_S2, LinkMasses, gravity_torques
+from calib.chain.kinematics.gravity import (
+    STANDARD_GRAVITY_M_S2,
+    LinkMasses,
+    base_moment,
+    gravity_torques,
+)
 from calib.views import BoolArray, FloatArray
 
 InverseBranches = Callable[[FloatArray, FloatArray, float], FloatArray]
@@ -149,6 +154,10 @@ class ArmKinematics:
         return gravity_torques(
             self.frames(joints_rad), self.masses, payload_kg, payload_com_m, gravity_m_s2
         )
+
+    def base_moment(self, joints_rad: FloatArray, payload_kg: float = 0.0) -> FloatArray:
+        """Moment (..., 3) in Nm of the arm's weight about its base; see `gravity.base_moment`."""
+        return base_moment(self.frames(joints_rad), self.masses, payload_kg)
 
     def _rows(self, dh_offset: FloatArray | None) -> FloatArray:
         return self.dh if dh_offset is None else self.dh + dh_offset

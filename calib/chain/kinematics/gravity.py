@@ -54,17 +54,42 @@ def gravity_torques(
         (..., 6) torques in Nm, positive along the joint's positive sense.
         Source: Siciliano et al., Robotics, equation 7.39 (g_i = -sum_j m_j g0^T J_P,j).
     """
-    com = _in_base(frames[..., 1:, :, :], masses.com_m)
-    load = _in_base(frames[..., 6:, :, :], np.asarray(payload_com_m, float)[None])
-    points = np.concatenate([com, load], axis=-2)
-    weight = np.append(masses.mass_kg, payload_kg)[:, None] * np.asarray(gravity_m_s2, float)
-
+    points, weight = _weights(frames, masses, payload_kg, payload_com_m, gravity_m_s2)
     # Joint j carries the links j, j+1, ... and the payload: sums from the tip inwards.
     force = _sums_from_tip(np.broadcast_to(weight, points.shape))
     moment = _sums_from_tip(np.cross(points, weight))
     axis, origin = frames[..., :6, :3, 2], frames[..., :6, :3, 3]
     about_joint = moment - np.cross(origin, force)
     return np.asarray(-(axis * about_joint).sum(axis=-1))
+
+
+def base_moment(
+    frames: FloatArray,
+    masses: LinkMasses,
+    payload_kg: float,
+    payload_com_m: FloatArray | tuple[float, float, float] = (0.0, 0.0, 0.0),
+    gravity_m_s2: FloatArray | tuple[float, float, float] = STANDARD_GRAVITY_M_S2,
+) -> FloatArray:
+    """Moment (..., 3) in Nm with which the arm's weight turns its base about the base's origin.
+
+    Parameters are those of `gravity_torques`. Source: sum of r x m g over links and payload.
+    """
+    points, weight = _weights(frames, masses, payload_kg, payload_com_m, gravity_m_s2)
+    return np.asarray(np.cross(points, weight).sum(axis=-2))
+
+
+def _weights(
+    frames: FloatArray,
+    masses: LinkMasses,
+    payload_kg: float,
+    payload_com_m: FloatArray | tuple[float, float, float],
+    gravity_m_s2: FloatArray | tuple[float, float, float],
+) -> tuple[FloatArray, FloatArray]:
+    """(..., 7, 3) centres of mass of links and payload in the base, (7, 3) their weights."""
+    com = _in_base(frames[..., 1:, :, :], masses.com_m)
+    load = _in_base(frames[..., 6:, :, :], np.asarray(payload_com_m, float)[None])
+    points = np.concatenate([com, load], axis=-2)
+    return points, np.append(masses.mass_kg, payload_kg)[:, None] * np.asarray(gravity_m_s2, float)
 
 
 def _in_base(frames: FloatArray, points_m: FloatArray) -> FloatArray:

@@ -88,7 +88,8 @@ register(
     ),
 )
 register(
-    "joint_zero_offset link_geometry joint_compliance joint_periodic_error robot_model arm",
+    "joint_zero_offset link_geometry joint_compliance joint_periodic_error robot_model "
+    "base_compliance arm",
     Picture(
         arm.error_against_joints,
         "The camera's position error follows a joint's angle before, and no joint's after.",
@@ -113,7 +114,7 @@ register(
     ),
 )
 register(
-    "thermal_mount_drift thermal_focal_drift thermal_board_growth",
+    "thermal_mount_drift thermal_focal_drift thermal_board_growth base_drift",
     Picture(
         order.drift,
         "The error moves steadily with time or temperature before, and not after.",
@@ -121,8 +122,8 @@ register(
     ),
 )
 register(
-    "mount_slip board_slip frame_pose_offset frame_pose_swap length_unit rotation_convention "
-    "bookkeeping",
+    "mount_slip board_slip optics_step frame_pose_offset frame_pose_swap length_unit "
+    "rotation_convention bookkeeping",
     Picture(
         order.by_frame,
         "Which frames are off: a step is a slip, single peaks are frames paired with a wrong pose.",

@@ -76,9 +76,31 @@ def _(p: Numbers, scene: Scene) -> None:
     scene.joints = scene.joints - _each_joint(p, "rad_per_Nm") * weight
 
 
-def _potential_energy(joints: Array, scene: Scene) -> Array:
+@_of("base_compliance")
+def _(p: Numbers, scene: Scene) -> None:
+    """The moment as what the weights' energy loses by a small tilt of the base."""
+    lost = autograd.grad(lambda tilt: _potential_energy(scene.logged_joints, scene, tilt))
+    about_x, about_y = -lost(np.zeros(2))
+    turn = anp.stack(
+        [p["rad_per_Nm"] * about_x, (p["rad_per_Nm"] + p["rad_per_Nm_y_more"]) * about_y]
+    )
+    tilt = formulas.rigid(anp.concatenate([np.zeros(3), turn, np.zeros(1)]))
+    scene.base = anp.dot(tilt, scene.base)
+
+
+@_of("base_drift")
+def _(p: Numbers, scene: Scene) -> None:
+    scene.base = anp.dot(formulas.rigid(_warmth(p, scene) * _six(p)), scene.base)
+
+
+def _potential_energy(joints: Array, scene: Scene, tilt: Array | None = None) -> Array:
     """Of links and payload; its gradient by the joints is the holding torque."""
-    energy, frame, masses = 0.0, anp.eye(4), arm(ARM).masses
+    base = (
+        anp.eye(4)
+        if tilt is None
+        else formulas.rigid(anp.concatenate([np.zeros(3), tilt, np.zeros(1)]))
+    )
+    energy, frame, masses = 0.0, base, arm(ARM).masses
     for link in range(6):
         frame = anp.dot(frame, formulas.flange(joints[link : link + 1], scene.nominal_dh[[link]]))
         centre = anp.dot(frame[2, :3], masses.com_m[link]) + frame[2, 3]
@@ -219,6 +241,14 @@ def _side(p: Numbers, scene: Scene) -> float:
 @_of("thermal_focal_drift")
 def _(p: Numbers, scene: Scene) -> None:
     _scale_focal(scene, 1.0 + p["relative"] * _warmth(p, scene))
+
+
+@_of("optics_step")
+def _(p: Numbers, scene: Scene) -> None:
+    if scene.logged("frame") >= p["at_frame"]:
+        _scale_focal(scene, 1.0 + p["relative"])
+        _add(scene, "u0_px", p["u_px"])
+        _add(scene, "v0_px", p["v_px"])
 
 
 @_of("decentering")

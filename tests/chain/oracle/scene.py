@@ -19,8 +19,9 @@ ORDER = ("clock", "arm", "mount", "board", "lens", "sensor")
 class Scene:
     """What is true while one frame is exposed; effects put new values in place of these.
 
-    `dh` are the arm's nominal rows, `flange`, `mounted` and `fixed` (4, 4) transforms as in a cell
-    model, `optics` its columns by name; `focused_before` is the frame before's distance.
+    `base` is where the arm's base stands against where it was taken to stand, `dh` are the arm's
+    nominal rows, `flange`, `mounted` and `fixed` (4, 4) transforms as in a cell model, `optics` its
+    columns by name; `focused_before` is the frame before's distance.
     """
 
     def __init__(self, views: Views, frame: int, dh: FloatArray, optics: dict[str, Array]) -> None:
@@ -29,6 +30,7 @@ class Scene:
         self.speed: FloatArray = views.joint_velocity_rad_s[frame]
         self.joints: Array = self.logged_joints
         self.nominal_dh, self.dh = dh, dh
+        self.base: Array = np.eye(4)
         self.flange: Array = views.base_from_flange[frame]
         self.mounted: Array = np.eye(4)
         self.fixed: Array = np.eye(4)
@@ -68,7 +70,8 @@ class Scene:
 
     def move_arm(self) -> None:
         """The logged pose, corrected by what the effects change in the nominal arm."""
-        self.flange = anp.dot(self._to_nominal(), formulas.flange(self.joints, self.dh))
+        moved = anp.dot(self._to_nominal(), formulas.flange(self.joints, self.dh))
+        self.flange = anp.dot(self.base, moved)
 
     def _to_nominal(self) -> FloatArray:
         nominal = formulas.flange(self.logged_joints, self.nominal_dh)
