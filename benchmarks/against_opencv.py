@@ -26,8 +26,9 @@ from calib.chain.projection import project
 from calib.chain.rigid import compose, inverse
 from calib.handeye import chain
 from calib.views import BoolArray, FloatArray, Views
-from cell.calibrate import calibrate_recording, corners_of
-from cell.recording import read_recording
+from cell.storage.recording import read_recording
+from cell.storage.recording.detect import corners_of
+from cell.verbs.calibrate import calibrate_recording
 
 HAND_EYE = {
     "Shah": cv2.CALIB_ROBOT_WORLD_HAND_EYE_SHAH,

@@ -22,7 +22,7 @@ from benchmarks.corner_pictures import Image
 from calib.detection import detect, make_ready
 from calib.detection.markers import layouts
 from calib.views import Board
-from cell.recording import Recording, read_recording
+from cell.storage.recording import Recording, read_recording
 
 Finder = Callable[[Image, Board], bool]
 

@@ -23,7 +23,7 @@ from benchmarks.paper_tables import NAMES, TABLE_2
 from calib.chain.rigid import inverse
 from calib.paper.focus_law import FocusLaw
 from calib.views import FloatArray
-from cell.report.figures.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION
+from cell.views.report.figures.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION
 
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 CELLS = {"ur3-robotiq": "Robotiq wrist camera", "irb140-eosens": "EoSens 12CXP+"}

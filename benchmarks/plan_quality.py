@@ -40,13 +40,14 @@ from calib.solver.noise import Noise
 from calib.solver.pose_information import pose_information
 from calib.solver.unknowns import PLAIN_OPTICS, unknowns_of
 from calib.views import FloatArray, Views
-from cell.files.cell_file import read_cell
-from cell.planning import PlanSize, design_plan
-from cell.planning.candidates import TILT_RAD, Sight
-from cell.planning.nominal import assume
-from cell.planning.pool import Pool
-from cell.planning.reach import layout_of, reachable
+from cell.devices.planned_camera import PlannedCamera
 from cell.sequencer.guard import Guard
+from cell.storage.files.cell_file import read_cell
+from cell.verbs.plan import PlanSize, design_plan
+from cell.verbs.plan.candidate_pool import CandidatePool
+from cell.verbs.plan.candidates import TILT_RAD
+from cell.verbs.plan.nominal import assume
+from cell.verbs.plan.reach import layout_of, reachable
 from sim.arm import Repeatability
 from sim.synthesize import synthesize_corners
 
@@ -63,7 +64,7 @@ class Bench:
 
     def __init__(self, name: str) -> None:
         self.cell = read_cell(CONFIGS / f"{name}.cell.yaml")
-        self.layout, self.sight = layout_of(self.cell), Sight.of(self.cell)
+        self.layout, self.sight = layout_of(self.cell), PlannedCamera.of(self.cell)
         self.guard = Guard(self.cell, 0.1, 0.5)
         self.assumed = assume(self.cell)
         truth = self.cell.simulation
@@ -113,7 +114,7 @@ class Bench:
 
     def least(self, frames: int) -> FloatArray:
         """(K,) one sigma of each need with views chosen for it alone."""
-        found = Pool(self.cell, 1).varied
+        found = CandidatePool(self.cell, 1).varied
         views = self.assumed.views([c.base_from_flange for c in found])
         noise = self.assumed.noise
         information = pose_information(self.plain, views, [self.lens], noise).frames

@@ -20,14 +20,14 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
-from cell.files.plan_file import Plan, read_plan
-from cell.page.address import Address
-from cell.page.application import OWN_HEADER
-from cell.page.live_run import LiveRun
-from cell.page.server import LivePage
+from cell.devices.simulated_cell import home_of, simulated_cell
 from cell.sequencer.sequencer import Devices
 from cell.sequencer.session import record_plan
-from cell.simulated import home_of, simulated_cell
+from cell.storage.files.plan_file import Plan, read_plan
+from cell.views.page.address import Address
+from cell.views.page.application import OWN_HEADER
+from cell.views.page.live_run import LiveRun
+from cell.views.page.server import LivePage
 from sim.arm import SimArm
 from sim.build import build
 from sim.clock import WallClock

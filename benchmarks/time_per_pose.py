@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cell.files.plan_file import Plan, read_plan
-from cell.planning.duration import move_s
-from cell.recording import FrameRecord, read_recording
 from cell.sequencer.guard import Guard
+from cell.storage.files.plan_file import Plan, read_plan
+from cell.storage.recording import FrameRecord, read_recording
+from cell.verbs.plan.duration import move_s
 from sim.arm import SETTLE_S
 from sim.camera import FOCUSING_S
 

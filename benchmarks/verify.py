@@ -21,12 +21,12 @@ import numpy as np
 from calib import Views, as_mapping, calibrate
 from calib.chain.optics import COLUMN
 from calib.chain.rigid import from_vector
-from cell.export.reading import CalibrationSource
-from cell.files.plan_file import read_plan
-from cell.simulated import home_of, log_of, simulated_cell
-from cell.verify.judge import Judgement, judge
-from cell.verify.old_cell import OldCell, old_cell
-from cell.verify.short_plan import SHORT, choose_views
+from cell.devices.simulated_cell import home_of, log_of, simulated_cell
+from cell.storage.files.calibration_source import CalibrationSource
+from cell.storage.files.plan_file import read_plan
+from cell.verbs.verify.judge import Judgement, judge
+from cell.verbs.verify.old_cell import OldCell, old_cell
+from cell.verbs.verify.short_plan import SHORT, choose_views
 from sim.cell import SimulatedCell
 from sim.synthesize import synthesize
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from calib.chain.effect import LINKS, Effect, Parameter
 from calib.chain.effects import catalogue
 from calib.discovery.ambiguity import experiment
-from cell.report.evidence.registry import EVIDENCE
+from cell.views.report.evidence.registry import EVIDENCE
 
 FOLDER = Path(__file__).parents[1] / "docs" / "effects"
 _PLAN = "configs/irb140-eosens.plan.yaml"

@@ -16,8 +16,8 @@ from typer.main import get_command
 
 import calib
 from cell.cli.app import app
-from cell.files.schemas import MODELS
-from cell.recording import FrameRecord, Header
+from cell.storage.files.schemas import MODELS
+from cell.storage.recording import FrameRecord, Header
 
 FOLDER = Path(__file__).parents[1] / "docs" / "reference"
 _MADE = "Made by `tools/reference_pages.py` from the code."
@@ -80,7 +80,7 @@ def _files() -> str:
     parts = [
         "# Files, key by key",
         f"{_MADE} Lengths are metres, angles radians unless a key's name says another unit. The "
-        "same as JSON Schema, for editors, stands in `cell/schemas/`.",
+        "same as JSON Schema, for editors, stands in `cell/storage/schemas/`.",
     ]
     for name, model in _FILES.items():
         schema = model.model_json_schema(by_alias=True)

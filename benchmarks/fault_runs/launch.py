@@ -15,7 +15,7 @@ from pathlib import Path
 from cell.sequencer.journal import read_journal
 
 _FORKS = multiprocessing.get_context("forkserver")
-_FORKS.set_forkserver_preload(["cell.cli", "cell.run", "cell.cli.run"])
+_FORKS.set_forkserver_preload(["cell.cli", "cell.verbs.run", "cell.cli.run"])
 _START_S = 30.0
 
 

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from cell.files.plan_file import Plan, read_plan
-from cell.files.yaml_model import read_mapping
-from cell.simulated import home_of, simulated_cell
+from cell.devices.simulated_cell import home_of, simulated_cell
+from cell.storage.files.plan_file import Plan, read_plan
+from cell.storage.files.yaml_model import read_mapping
 from sim.arm import SimArm
 from sim.build import build
 from sim.camera import SimCamera

@@ -17,8 +17,8 @@ from benchmarks.fault_runs.faults import Fault
 from benchmarks.fault_runs.launch import Launch
 from benchmarks.fault_runs.stands import Stand
 from calib.detection import Detection, detect
-from cell.recording import Recording, read_recording
-from cell.recording.frames import FILE_NAME as FRAMES
+from cell.storage.recording import Recording, read_recording
+from cell.storage.recording.frames import FILE_NAME as FRAMES
 from sim.log import Row, views_of
 from sim.synthesize import true_corners
 

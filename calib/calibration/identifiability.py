@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.calibration.made_views import views_that_see
+from calib.calibration.simulated_views import views_that_see
 from calib.chain.effects import make_effect
 from calib.chain.rigid import compose
 from calib.solver.joint import JointFit

@@ -20,7 +20,7 @@ from calib.calibration.result import (
     Statistics,
 )
 from calib.calibration.uncertainty import UncertaintyMap
-from calib.calibration.verdict_words import why
+from calib.calibration.verdict_messages import why
 from calib.paper.focus_law import FocusLaw
 from calib.paper.scale_factors import ScaleFactor
 from calib.paper.zones import Zones

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calib.calibration.held_out_check import vindicated
 from calib.calibration.joint_lens import with_deserved_terms
 from calib.calibration.result import VALUES, RobotReference
-from calib.calibration.vindication import vindicated
 from calib.chain.effects import make_effect
 from calib.chain.model import CellModel, walk
 from calib.chain.optics import COLUMN

@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from calib.calibration.made_views import views_that_see
+from calib.calibration.simulated_views import views_that_see
 from calib.chain import rigid
 from calib.chain.model import CellModel, predict, walk
 from calib.chain.optics import COLUMN

@@ -16,7 +16,6 @@ from cell.cli.diagnose import diagnose
 from cell.cli.doctor import doctor
 from cell.cli.export import export
 from cell.cli.importing import import_
-from cell.cli.output import say_error
 from cell.cli.page_option import WithPage
 from cell.cli.plan import plan
 from cell.cli.run import run
@@ -25,6 +24,7 @@ from cell.cli.study import study
 from cell.cli.verify import verify
 from cell.compiled import prepare
 from cell.errors import EXIT_OPERATOR, exit_status_of
+from cell.views.terminal.output import say_error
 
 app = typer.Typer(
     name="cell",

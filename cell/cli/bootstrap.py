@@ -8,8 +8,10 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from cell.cli.output import JsonFlag, new_folder, say, say_error, show
+from cell.cli.json_flag import JsonFlag
 from cell.errors import InputError
+from cell.storage.files.results import new_folder
+from cell.views.terminal.output import say, say_error, show
 
 _NO_BOARD = (
     " Nothing was moved. Drive the arm by hand until the whole board is in the picture, sharp, and"
@@ -53,13 +55,13 @@ def bootstrap(
 
     Before: drive the arm by hand so that the whole board is in the picture.
     """
-    from cell.bootstrap import Bootstrap, Told
-    from cell.cli.progress import run_progress
+    from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
+    from cell.views.terminal.progress import run_progress
 
     start = _angles(start_deg, dry_run)
     name = cell.name.split(".")[0]
     recording = output or new_folder(f"{name}-bootstrap")
-    told = Told(
+    told = LayoutDoubt(
         1e-3 * mount_mm, float(np.radians(mount_deg)), 1e-3 * fixed_mm, reach_m=1e-3 * reach_mm
     )
     task = Bootstrap.of(cell, recording, output or cell.parent, told)

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, show
+from cell.cli.json_flag import JsonFlag
+from cell.views.terminal.output import show
 
 
 def calibrate(
@@ -18,10 +19,10 @@ def calibrate(
     as_json: JsonFlag = False,
 ) -> None:
     """Calibrate a recording; writes calibration.json and report.html."""
-    from cell.calibrate import calibrate_into
-    from cell.cli.progress import counted_progress
-    from cell.cli.summary import calibration_summary
-    from cell.recording import read_recording
+    from cell.storage.recording import read_recording
+    from cell.verbs.calibrate import calibrate_into
+    from cell.views.terminal.progress import counted_progress
+    from cell.views.terminal.summary import calibration_summary
 
     source = read_recording(recording)
     with counted_progress("finding corners") as progress:

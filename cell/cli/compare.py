@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, say, show
+from cell.cli.json_flag import JsonFlag
+from cell.views.terminal.output import say, show
 
 
 def compare(
@@ -19,11 +20,11 @@ def compare(
     as_json: JsonFlag = False,
 ) -> None:
     """Compare two calibrations or recordings of one camera, in pixels and millimetres."""
-    from cell.compare import compare as compare_sides
-    from cell.compare import side_of
-    from cell.compare.page import write_page
-    from cell.compare.sources import source_of
-    from cell.compare.telling import as_mapping, text
+    from cell.verbs.compare import compare as compare_sides
+    from cell.verbs.compare import side_of
+    from cell.verbs.compare.messages import as_mapping, text
+    from cell.verbs.compare.page import write_page
+    from cell.verbs.compare.sources import source_of
 
     comparison = compare_sides(side_of(source_of(a), str(a)), side_of(source_of(b), str(b)))
     if output is not None:

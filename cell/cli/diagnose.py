@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, show
+from cell.cli.json_flag import JsonFlag
+from cell.views.terminal.output import show
 
 
 def diagnose(
@@ -24,10 +25,10 @@ def diagnose(
     as_json: JsonFlag = False,
 ) -> None:
     """Diagnose a recording; writes diagnosis.json, twin.yaml and report.html."""
-    from cell.cli.progress import counted_progress
-    from cell.cli.summary import diagnosis_summary
-    from cell.diagnose import diagnose_into
-    from cell.recording import read_recording
+    from cell.storage.recording import read_recording
+    from cell.verbs.diagnose import diagnose_into
+    from cell.views.terminal.progress import counted_progress
+    from cell.views.terminal.summary import diagnosis_summary
 
     source = read_recording(recording)
     names = None if effects is None else [name for name in effects.split(",") if name]

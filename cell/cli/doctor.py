@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, show
+from cell.cli.json_flag import JsonFlag
 from cell.errors import EXIT_DEVICE
+from cell.views.terminal.output import show
 
 
 def doctor(
@@ -16,8 +17,8 @@ def doctor(
     as_json: JsonFlag = False,
 ) -> None:
     """Look what stands in the way of a run; nothing is moved or changed."""
-    from cell.doctor import examine
-    from cell.files.cell_file import read_cell
+    from cell.storage.files.cell_file import read_cell
+    from cell.verbs.doctor import examine
 
     findings = examine(None if cell is None else read_cell(cell))
     blocking = [finding.name for finding in findings if finding.blocks]

@@ -9,8 +9,9 @@ from typing import Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, say, show
+from cell.cli.json_flag import JsonFlag
 from cell.errors import InputError
+from cell.views.terminal.output import say, show
 
 
 def export(
@@ -34,8 +35,8 @@ def export(
     as_json: JsonFlag = False,
 ) -> None:
     """Write the calibrated camera for ROS, OpenCV, mrcal, Kalibr, COLMAP or as JSON."""
-    from cell.export import export_calibration, read_calibration
-    from cell.export.place import calibration_file
+    from cell.storage.files.calibration_place import calibration_file
+    from cell.verbs.export import export_calibration, read_calibration
 
     path = calibration_file(calibration)
     source = read_calibration(path)

@@ -8,9 +8,11 @@ from typing import Annotated, Any
 import typer
 
 from calib.views import Mount
-from cell.cli.output import JsonFlag, new_folder, say, show
+from cell.cli.json_flag import JsonFlag
 from cell.errors import InputError
-from cell.importing import RotationName, Unit
+from cell.storage.files.results import new_folder
+from cell.verbs.importing import RotationName, Unit
+from cell.views.terminal.output import say, show
 
 
 def import_(
@@ -44,8 +46,8 @@ def import_(
     as_json: JsonFlag = False,
 ) -> None:
     """Turn images and poses of another tool's layout into a recording, corners found."""
-    from cell.cli.progress import counted_progress
-    from cell.importing.importer import Described, import_source
+    from cell.verbs.importing.importer import Described, import_source
+    from cell.views.terminal.progress import counted_progress
 
     described = Described(
         board=None if board is None else parse_board(board),

@@ -7,7 +7,7 @@ from typing import Any
 
 from typer.core import TyperCommand
 
-from cell.page.address import DEFAULT, is_address
+from cell.views.page.address import DEFAULT, is_address
 
 NAME = "--page"
 

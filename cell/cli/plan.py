@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, show
+from cell.cli.json_flag import JsonFlag
+from cell.views.terminal.output import show
 
 if TYPE_CHECKING:
-    from cell.files.plan_file import Plan
-    from cell.planning import Wish
+    from cell.storage.files.plan_file import Plan
+    from cell.verbs.plan import Requirements
 
 
 def plan(
@@ -48,9 +49,9 @@ def plan(
     as_json: JsonFlag = False,
 ) -> None:
     """Design a plan: the views that make the calibration most certain, and the way between them."""
-    from cell.planning import Wish
+    from cell.verbs.plan import Requirements
 
-    wish = Wish(frames, parallel, varied, alpha_sigma_px, seed, by_hand)
+    wish = Requirements(frames, parallel, varied, alpha_sigma_px, seed, by_hand)
     if power:
         _power(cell, output, wish, as_json=as_json)
         return
@@ -58,19 +59,19 @@ def plan(
     _tell(_written(cell, path, wish), as_json=as_json)
 
 
-def _designed(cell: Path, path: Path, wish: Wish) -> Plan:
-    from cell.files.cell_file import read_cell
-    from cell.files.plan_file import Plan
-    from cell.planning import design_plan
+def _designed(cell: Path, path: Path, wish: Requirements) -> Plan:
+    from cell.storage.files.cell_file import read_cell
+    from cell.storage.files.plan_file import Plan
+    from cell.verbs.plan import design_plan
 
     beside = os.path.relpath(cell.resolve(), path.resolve().parent)
     read = read_cell(cell)
     return Plan(path, design_plan(read, wish.size_for(read), beside), read)
 
 
-def _written(cell: Path, path: Path, wish: Wish) -> Plan:
+def _written(cell: Path, path: Path, wish: Requirements) -> Plan:
     """Design a plan and write it."""
-    from cell.files.writing import check_new, write_new, yaml_text
+    from cell.storage.files.writing import check_new, write_new, yaml_text
 
     check_new(path)
     plan = _designed(cell, path, wish)
@@ -80,27 +81,27 @@ def _written(cell: Path, path: Path, wish: Wish) -> Plan:
 
 
 def _tell(plan: Plan, *, as_json: bool) -> None:
-    from cell.planning import power, prospect
+    from cell.verbs.plan import expected_uncertainty, power
 
     stations = [view.station for view in plan.file.views]
     counts = {kind: stations.count(kind) for kind in ("parallel", "varied")}
-    promised, seen = prospect.prospect_of(plan), power.power_of(plan)
+    promised, seen = expected_uncertainty.expected_from(plan), power.power_of(plan)
     result = {
         "plan": str(plan.path),
         "views": len(stations),
         **counts,
-        "expected": prospect.as_mapping(promised),
+        "expected": expected_uncertainty.as_mapping(promised),
         "effects": power.as_shares(seen),
     }
     head = f"{plan.path}: {counts['parallel']} parallel and {counts['varied']} tilted views"
-    lines = [head, *prospect.as_lines(promised), *power.as_lines(seen)]
+    lines = [head, *expected_uncertainty.as_lines(promised), *power.as_lines(seen)]
     show("\n".join(lines), result, as_json=as_json)
 
 
-def _power(given: Path, output: Path | None, wish: Wish, *, as_json: bool) -> None:
+def _power(given: Path, output: Path | None, wish: Requirements, *, as_json: bool) -> None:
     from rich.console import Console
 
-    from cell.planning.power import as_mapping, as_text, is_plan, power_of, power_of_file
+    from cell.verbs.plan.power import as_mapping, as_text, is_plan, power_of, power_of_file
 
     if is_plan(given):
         found = power_of_file(given)

@@ -8,11 +8,13 @@ from typing import Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, new_folder, say, say_error, show
+from cell.cli.json_flag import JsonFlag
 from cell.errors import InputError
-from cell.page.address import DEFAULT
+from cell.storage.files.results import new_folder
+from cell.views.page.address import DEFAULT
+from cell.views.terminal.output import say, say_error, show
 
-DEFAULT_PLAN = Path(__file__).parents[1] / "defaults" / "irb140-eosens.plan.yaml"
+DEFAULT_PLAN = Path(__file__).parents[1] / "storage" / "defaults" / "irb140-eosens.plan.yaml"
 
 
 def run(
@@ -50,9 +52,9 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Move, grab and log every view of a plan, then calibrate, diagnose and report."""
-    from cell.files.plan_file import read_plan
-    from cell.run import Outcome, evaluate, record, shown_on_page, truth_of
     from cell.sequencer.states import Finish
+    from cell.storage.files.plan_file import read_plan
+    from cell.verbs.run import Outcome, evaluate, record, shown_on_page, truth_of
 
     if peers and not dry_run:
         raise InputError("--peers goes with --dry-run: cell run PLAN.yaml --dry-run --peers")

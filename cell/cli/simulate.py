@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, new_folder, show
+from cell.cli.json_flag import JsonFlag
+from cell.storage.files.results import new_folder
+from cell.views.terminal.output import show
 
 
 def simulate(
@@ -28,8 +30,8 @@ def simulate(
     as_json: JsonFlag = False,
 ) -> None:
     """Make the recording that a simulated cell would give, with the named effects in it."""
-    from cell.files.plan_file import read_plan
-    from cell.simulate import simulate_corners, simulate_pictures, with_effects
+    from cell.storage.files.plan_file import read_plan
+    from cell.verbs.simulate import simulate_corners, simulate_pictures, with_effects
 
     read = read_plan(plan)
     folder = output or new_folder(f"{read.file.name}-simulated")

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cell.cli.output import JsonFlag, same_folder, say, show
+from cell.cli.json_flag import JsonFlag
 from cell.errors import EXIT_BAD_ANSWER
+from cell.storage.files.results import same_folder
+from cell.views.terminal.output import say, show
 
 if TYPE_CHECKING:
-    from cell.study.run import Outcome
+    from cell.verbs.study.run import Outcome
 
 _REASONS = 5
 
@@ -33,13 +35,13 @@ def study(
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study, or the rest of one: what is done stays, what failed is tried again."""
-    from cell.study.extra import require_extra
+    from cell.verbs.study.extra import require_extra
 
     require_extra()
-    from cell.cli.progress import counted_progress
-    from cell.files.study_file import read_study
     from cell.sequencer.stop import StopRequest, signals_ask
-    from cell.study.run import run_study
+    from cell.storage.files.study_file import read_study
+    from cell.verbs.study.run import run_study
+    from cell.views.terminal.progress import counted_progress
 
     read, stop = read_study(study), StopRequest()
     folder = output or same_folder(read.file.name)

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cell.cli.output import JsonFlag, new_folder, say, say_error, show
+from cell.cli.json_flag import JsonFlag
 from cell.errors import InputError
+from cell.storage.files.results import new_folder
+from cell.views.terminal.output import say, say_error, show
 
 if TYPE_CHECKING:
-    from cell.recording import Recording
-    from cell.verify.length import KnownLength
+    from cell.storage.recording import Recording
+    from cell.verbs.verify.length import KnownLength
 
 
 def verify(
@@ -51,9 +53,9 @@ def verify(
     as_json: JsonFlag = False,
 ) -> None:
     """Check an old calibration against the camera as it is now; exit status 1 unless it holds."""
-    from cell.cli.progress import counted_progress
-    from cell.verify.verb import verify_into
-    from cell.verify.words import text
+    from cell.verbs.verify.messages import text
+    from cell.verbs.verify.verb import verify_into
+    from cell.views.terminal.progress import counted_progress
 
     if not tolerance_mm > 0:
         raise InputError(f"--tolerance-mm {tolerance_mm:g}: must be above 0")
@@ -77,8 +79,8 @@ def _recording(
     source: Path, calibration: Path, dry_run: bool, views: int, output: Path | None
 ) -> tuple[Recording, Path]:
     """The recording to look at, taken now where `source` is a plan, and where results go."""
-    from cell.files.results import results_folder
-    from cell.recording import read_recording
+    from cell.storage.files.results import results_folder
+    from cell.storage.recording import read_recording
 
     if source.is_dir():
         if dry_run:
@@ -92,10 +94,10 @@ def _recording(
 
 def _run(source: Path, calibration: Path, dry_run: bool, views: int, folder: Path) -> None:
     """Take the plan's most telling views; leaves with the run's own exit status if it fails."""
-    from cell.files.plan_file import read_plan
-    from cell.run import Outcome, record
-    from cell.verify.short_plan import shortened
-    from cell.verify.verb import read_old
+    from cell.storage.files.plan_file import read_plan
+    from cell.verbs.run import Outcome, record
+    from cell.verbs.verify.short_plan import shortened
+    from cell.verbs.verify.verb import read_old
 
     old, _ = read_old(calibration)
     plan = shortened(old, read_plan(source), views)
@@ -108,7 +110,7 @@ def _run(source: Path, calibration: Path, dry_run: bool, views: int, folder: Pat
 
 
 def _known(length_m: float | None, sigma_m: float, corners: str | None) -> KnownLength | None:
-    from cell.verify.length import KnownLength
+    from cell.verbs.verify.length import KnownLength
 
     if length_m is None and corners is None:
         return None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.detection import Detection, detect, make_ready
 from calib.views import Board
-from cell.files.plan_file import Checks
+from cell.storage.files.plan_file import Checks
 
 
 @dataclass(frozen=True)

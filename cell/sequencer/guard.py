@@ -10,9 +10,9 @@ import numpy as np
 from calib.chain.kinematics import MODELS, ArmKinematics, OutOfReach, UnknownArm, arm
 from calib.views import Board, FloatArray
 from cell.errors import InputError
-from cell.files.cell_file import CellFile
-from cell.files.parts import Box
-from cell.files.plan_file import Plan
+from cell.storage.files.cell_file import CellFile
+from cell.storage.files.parts import Box
+from cell.storage.files.plan_file import Plan
 from drivers.arm import MoveTarget
 from drivers.errors import SafetyError
 

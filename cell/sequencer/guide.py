@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from cell.files.plan_file import View
 from cell.sequencer.guard import Guard
 from cell.sequencer.watcher import Watcher
+from cell.storage.files.plan_file import View
 
 
 class Guide(Watcher, ABC):

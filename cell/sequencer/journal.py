@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from cell.errors import InputError
-from cell.files.plan_file import Plan
-from cell.recording.disk import told, write_synced
+from cell.storage.files.plan_file import Plan
+from cell.storage.recording.disk import told, write_synced
 
 FILE_NAME = "journal.jsonl"
 

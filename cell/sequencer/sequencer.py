@@ -17,8 +17,6 @@ from itertools import pairwise
 
 from calib.views import FloatArray
 from cell.errors import BadAnswer, DiskFailed, exit_status_of
-from cell.files.plan_file import Plan
-from cell.recording import RecordingWriter
 from cell.sequencer.checks import Verdict, check_frame, make_check_ready
 from cell.sequencer.clock import Clock, HostClock
 from cell.sequencer.goal import Goal
@@ -34,6 +32,8 @@ from cell.sequencer.watched_arm import POLL_S, WatchedArm, joints_of
 from cell.sequencer.watched_camera import CameraLost, asked_of_camera
 from cell.sequencer.watcher import Checked, Watcher, Watchers
 from cell.sequencer.worker import Worker
+from cell.storage.files.plan_file import Plan
+from cell.storage.recording import RecordingWriter
 from drivers.arm import Arm, ArmState
 from drivers.camera import Camera, FocusSetting, Frame
 from drivers.errors import FrameLost, StopFailed

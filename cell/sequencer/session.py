@@ -9,9 +9,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from cell.files.plan_file import Plan
-from cell.recording import FrameRecord, Header, RecordingWriter
-from cell.recording.corners import FILE_NAME as DETECTIONS
 from cell.sequencer.goal import Goal
 from cell.sequencer.guide import Guide
 from cell.sequencer.journal import Journal, check_same_plan, skipped_views
@@ -21,6 +18,9 @@ from cell.sequencer.sequencer import Devices, Sequencer
 from cell.sequencer.states import RunResult
 from cell.sequencer.stop import StopRequest, signals_ask
 from cell.sequencer.watcher import Watcher
+from cell.storage.files.plan_file import Plan
+from cell.storage.recording import FrameRecord, Header, RecordingWriter
+from cell.storage.recording.corners import FILE_NAME as DETECTIONS
 
 
 def record_plan(

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from calib.detection import Detection
-from cell.files.plan_file import Checks, View
-from cell.recording import FrameRecord, PoseRecord
+from cell.storage.files.plan_file import Checks, View
+from cell.storage.recording import FrameRecord, PoseRecord
 from drivers.arm import ArmState, Motion
 from drivers.camera import Frame
 

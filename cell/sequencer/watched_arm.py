@@ -13,10 +13,10 @@ import numpy as np
 
 from calib.views import FloatArray
 from cell.errors import StoppedByOperator
-from cell.files.plan_file import Settle
 from cell.sequencer.clock import Clock
 from cell.sequencer.guard import Guard
 from cell.sequencer.stop import StopRequest
+from cell.storage.files.plan_file import Settle
 from drivers.arm import Arm, ArmState, Motion
 from drivers.errors import ArmStopped, DeviceError, StopFailed
 
@@ -41,7 +41,7 @@ class WatchedArm:
     stop_request:
         Looked at in every wait.
     on_reading:
-        Told of every reading; must not raise or block.
+        LayoutDoubt of every reading; must not raise or block.
     connected:
         Whether `connect` succeeded: from then on every fault stops the arm.
     """

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from cell.recording import FrameRecord
 from cell.sequencer.checks import Verdict
 from cell.sequencer.shot import Shot
 from cell.sequencer.states import Status
+from cell.storage.recording import FrameRecord
 from drivers.arm import ArmState
 
 

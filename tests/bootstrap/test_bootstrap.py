@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cell.bootstrap import Bootstrap, Told
-from cell.bootstrap.near_guard import NearGuard, enlarged
 from cell.cli.bootstrap import bootstrap as verb
 from cell.errors import InputError
-from cell.files.cell_file import CellFile, read_cell
-from cell.files.parts import Pose
-from cell.files.plan_file import read_plan
-from cell.files.writing import yaml_text
-from cell.recording import read_recording
 from cell.sequencer.journal import read_journal
 from cell.sequencer.states import Finish
+from cell.storage.files.cell_file import CellFile, read_cell
+from cell.storage.files.parts import Pose
+from cell.storage.files.plan_file import read_plan
+from cell.storage.files.writing import yaml_text
+from cell.storage.recording import read_recording
+from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
+from cell.verbs.bootstrap.near_guard import NearGuard, enlarged
 from drivers.errors import SafetyError
 from sim.arm import SimArm
 from tests.bootstrap.trials import Wrong, eye_to_hand, irb140, run_trial, ur3
@@ -67,7 +67,7 @@ def moved(task: Bootstrap, start_deg: tuple[float, ...] | None = None):  # type:
 
 
 def test_without_a_board_nothing_moves(tmp_path: Path) -> None:
-    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, Told())
+    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
     devices, done = moved(task, (31, -77, -110, -10, 10, 17))
     assert done.result.finish is Finish.GIVEN_UP
     assert "board not found" in done.result.reason
@@ -76,7 +76,7 @@ def test_without_a_board_nothing_moves(tmp_path: Path) -> None:
 
 
 def test_an_arm_of_another_model_is_not_moved(tmp_path: Path) -> None:
-    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, Told())
+    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
     devices = task.devices(dry_run=True)
     other = task.cell.model_copy(
         update={"robot": task.cell.robot.model_copy(update={"model": "ur5"})}
@@ -105,7 +105,7 @@ def test_a_layout_wrong_beyond_what_is_told_ends_the_moves(
     turn: Rotation, says: str, most_moves: int, tmp_path: Path
 ) -> None:
     path = written(with_mounted(ur3(), turn), tmp_path)
-    task = Bootstrap.of(path, tmp_path / "run", tmp_path, Told())
+    task = Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt())
     devices, done = moved(task)
     assert done.result.finish is Finish.BAD_INPUT
     assert says in done.result.reason
@@ -117,14 +117,14 @@ def test_a_box_that_the_layout_may_reach_stops_it_before_the_first_move(tmp_path
     assert cell.workspace is not None
     low = cell.workspace.model_copy(update={"high_m": (0.6, 0.5, 0.42)})
     path = written(cell.model_copy(update={"workspace": low}), tmp_path)
-    task = Bootstrap.of(path, tmp_path / "run", tmp_path, Told())
+    task = Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt())
     with pytest.raises(SafetyError, match=r"would leave the workspace.*drive the arm away"):
         moved(task)
     assert not (tmp_path / "run").exists()
 
 
 def test_boxes_grow_by_what_may_be_off() -> None:
-    told = Told(mount_m=0.04, mount_rad=0.1)
+    told = LayoutDoubt(mount_m=0.04, mount_rad=0.1)
     cell = ur3()
     grown = enlarged(cell, told)
     assert grown.workspace is not None
@@ -134,12 +134,12 @@ def test_boxes_grow_by_what_may_be_off() -> None:
     corner_m = np.hypot(0.16, 0.12)
     assert 0.85 - beside.low_m[0] == pytest.approx(0.04 + 0.1 * corner_m, abs=1e-3)
     with pytest.raises(InputError, match="nothing is left of it"):
-        enlarged(cell, Told(mount_m=0.6))
+        enlarged(cell, LayoutDoubt(mount_m=0.6))
 
 
 def test_a_guard_keeps_near(tmp_path: Path) -> None:
     start = np.radians([31.0, -77, -128, -10, 63, 17])
-    guard = NearGuard.around(ur3(), start, Told())
+    guard = NearGuard.around(ur3(), start, LayoutDoubt())
     guard.check_move(start, start + np.radians([0, 0, 0, 0, 10, 0]), "little")
     with pytest.raises(SafetyError, match="a bootstrap stays within 150 mm and 25°"):
         guard.check_move(start, start + np.radians([0, 0, 0, 0, 0, 30]), "far")
@@ -151,7 +151,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     path = written(ur3(), tmp_path)
     (tmp_path / "some.found.yaml").write_text("mine")
     with pytest.raises(InputError, match="is there already and is not overwritten"):
-        Bootstrap.of(path, tmp_path / "run", tmp_path, Told())
+        Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt())
 
 
 def test_start_angles_are_checked(tmp_path: Path) -> None:

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cell.bootstrap import Bootstrap, Told
-from cell.bootstrap.near_guard import enlarged
 from cell.errors import InputError
-from cell.files.cell_file import CellFile
-from cell.files.writing import yaml_text
 from cell.sequencer.states import Finish
+from cell.storage.files.cell_file import CellFile
+from cell.storage.files.writing import yaml_text
+from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
+from cell.verbs.bootstrap.near_guard import enlarged
 from sim.arm import SimArm
 from tests.bootstrap.trials import eye_to_hand, run_trial, ur3
 
@@ -51,13 +51,15 @@ def written(cell: CellFile, folder: Path) -> Path:
 
 def test_a_mount_of_the_wrong_kind_is_found_by_the_shifts(tmp_path: Path) -> None:
     unknown, start_deg = without_layout(ur3(), 3.8)
-    right = Bootstrap.of(written(unknown, tmp_path), tmp_path / "run", tmp_path, Told())
+    right = Bootstrap.of(written(unknown, tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
     devices = right.devices(dry_run=True, start_deg=start_deg)
     mistaken = unknown.model_copy(
         update={"mount": "eye_to_hand", "workspace": None, "keep_out": ()}
     )
     path = written(mistaken, tmp_path)
-    done = Bootstrap.of(path, tmp_path / "run", tmp_path, Told()).run(devices, simulated=True)
+    done = Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt()).run(
+        devices, simulated=True
+    )
     assert done.result.finish is Finish.BAD_INPUT
     assert "Check the mount" in done.result.reason
     assert isinstance(devices.arm, SimArm)
@@ -66,7 +68,7 @@ def test_a_mount_of_the_wrong_kind_is_found_by_the_shifts(tmp_path: Path) -> Non
 
 def test_without_a_layout_whatever_is_at_the_flange_may_point_anywhere() -> None:
     unknown, _ = without_layout(eye_to_hand(), 4.7)
-    grown = enlarged(unknown, Told(reach_m=0.1)).keep_out[0]
+    grown = enlarged(unknown, LayoutDoubt(reach_m=0.1)).keep_out[0]
     assert 0.85 - grown.low_m[0] == pytest.approx(0.1 + np.hypot(0.16, 0.12), abs=1e-9)
 
 
@@ -75,7 +77,7 @@ def test_what_is_lacking_is_said_before_anything_moves(tmp_path: Path) -> None:
     no_pixel = unknown.camera.model_copy(update={"pixel_size_um": None})
     path = written(unknown.model_copy(update={"camera": no_pixel}), tmp_path)
     with pytest.raises(InputError, match=r"camera\.lens\.focal_length_mm and camera\.pixel_size"):
-        Bootstrap.of(path, tmp_path / "run", tmp_path, Told())
-    task = Bootstrap.of(written(unknown, tmp_path), tmp_path / "run", tmp_path, Told())
+        Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt())
+    task = Bootstrap.of(written(unknown, tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
     with pytest.raises(InputError, match="say with --start-deg"):
         task.devices(dry_run=True)

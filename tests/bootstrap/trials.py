@@ -15,22 +15,22 @@ from calib.chain.kinematics import arm
 from calib.chain.model import CellModel, predict, walk
 from calib.detection import Detection
 from calib.views import BoolArray, FloatArray, Views
-from cell.bootstrap import Bootstrap, Told
-from cell.bootstrap.found import Found
-from cell.bootstrap.guide import BootstrapGuide
-from cell.bootstrap.near_guard import FARTHEST_M, FARTHEST_RAD, TRAVEL_RAD, NearGuard
+from cell.devices.simulated_cell import simulated_cell
 from cell.errors import CellError
-from cell.files.cell_file import CellFile, EffectFile, Layout, read_cell
-from cell.files.parts import Pose
-from cell.files.plan_file import PlanFile, read_plan
-from cell.files.writing import yaml_text
-from cell.planning import design_plan
-from cell.recording import FrameRecord, read_recording
 from cell.sequencer.checks import Verdict
 from cell.sequencer.guard import Guard
 from cell.sequencer.shot import Shot
 from cell.sequencer.watcher import Checked
-from cell.simulated import simulated_cell
+from cell.storage.files.cell_file import CellFile, EffectFile, Layout, read_cell
+from cell.storage.files.parts import Pose
+from cell.storage.files.plan_file import PlanFile, read_plan
+from cell.storage.files.writing import yaml_text
+from cell.storage.recording import FrameRecord, read_recording
+from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
+from cell.verbs.bootstrap.found import Found
+from cell.verbs.bootstrap.guide import BootstrapGuide
+from cell.verbs.bootstrap.near_guard import FARTHEST_M, FARTHEST_RAD, TRAVEL_RAD, NearGuard
+from cell.verbs.plan import design_plan
 from drivers.arm import ArmState, Motion
 from drivers.camera import Frame
 from drivers.errors import SafetyError
@@ -240,7 +240,7 @@ def run_trial(cell: CellFile, folder: Path, start_deg: tuple[float, ...] | None 
     folder.mkdir(parents=True)
     path = folder / f"{cell.name}.cell.yaml"
     path.write_text(yaml_text(cell.as_mapping()))
-    task = Bootstrap.of(path, folder / "run", folder, Told())
+    task = Bootstrap.of(path, folder / "run", folder, LayoutDoubt())
     done = task.run(task.devices(dry_run=True, start_deg=start_deg), simulated=True)
     frames = read_recording(task.recording).frames
     stops = np.array([frame.joints_rad for frame in frames])
@@ -257,11 +257,11 @@ def run_on_corners(
     """Bootstrap a cell without pictures: the true cell's corners go straight to the guide."""
     assert cell.layout is not None
     start = np.radians(cell.layout.home_deg if start_deg is None else start_deg)
-    guard = NearGuard.around(cell, start, Told())
+    guard = NearGuard.around(cell, start, LayoutDoubt())
     stops = [start]
     try:
         guard.check_start()
-        guide = BootstrapGuide(cell, cell.layout, guard, Told())
+        guide = BootstrapGuide(cell, cell.layout, guard, LayoutDoubt())
         guide.checked(frame_of(cell, start, 0, rng))
         while (view := guide.next_view()) is not None:
             stops.append(np.array(view.joints()))

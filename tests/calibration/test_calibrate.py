@@ -10,7 +10,7 @@ from calib.calibration import Calibration, Statistics, calibrate
 from calib.calibration.mapping import as_mapping
 from calib.errors import CalibrationError
 from calib.handeye import camera_position_error_m
-from cell.files.calibration_file import CalibrationFile
+from cell.storage.files.calibration_file import CalibrationFile
 from tests.paper.scene import (
     ALPHA0,
     BASE_FROM_FIXED,

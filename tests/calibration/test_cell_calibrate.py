@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calib.detection.same_order import same_order_everywhere
 from calib.views import Views
-from cell.calibrate import calibrate_into, default_folder, same_order_everywhere
 from cell.errors import BadAnswer, InputError
-from cell.recording import read_recording
+from cell.storage.recording import read_recording
+from cell.verbs.calibrate import calibrate_into, default_folder
 from tests.paper.scene import mixed_scene
 
 
@@ -56,7 +57,7 @@ def test_results_go_beside_the_recording_or_here_where_it_is_read_only(
 ) -> None:
     recording = read_recording(_write(tmp_path / "bench", mixed_scene(noise_px=0.1).views))
     assert default_folder(recording) == tmp_path / "bench" / "calibration"
-    monkeypatch.setattr("cell.files.results.os.access", lambda *_: False)
+    monkeypatch.setattr("cell.storage.files.results.os.access", lambda *_: False)
     monkeypatch.chdir(tmp_path)
     assert default_folder(recording) == tmp_path / "bench-calibration"
 

@@ -11,14 +11,14 @@ from calib.calibration import calibrate
 from calib.calibration.cross_validation import FOLDS, CrossValidation, cross_validate, fold_of
 from calib.calibration.mapping import as_mapping
 from calib.calibration.quantities import quantities_of
-from calib.calibration.verdict_words import why
+from calib.calibration.verdict_messages import why
 from calib.chain.rigid import from_vector
 from calib.errors import CalibrationError
 from calib.solver.joint import JointFit, fit_joint
 from calib.solver.noise import Noise
 from calib.solver.unknowns import amounts
 from calib.views import FloatArray, Mount, Views
-from cell.files.calibration_file import CalibrationFile
+from cell.storage.files.calibration_file import CalibrationFile
 from tests.calibration.fitted import fit, fitted, shuffled
 from tests.paper.scene import mixed_scene
 

@@ -10,7 +10,7 @@ import pytest
 from calib.calibration import calibrate
 from calib.calibration.mapping import as_mapping
 from calib.views import BoolArray, FloatArray, Mount, Views
-from cell.files.calibration_file import CalibrationFile
+from cell.storage.files.calibration_file import CalibrationFile
 from tests.paper.scene import mixed_scene
 
 TURNED, MIRRORED, OTHERS_POSE = 9, 12, 17

@@ -7,7 +7,7 @@ import numpy as np
 from calib.calibration import Statistics, calibrate
 from calib.chain.model import walk
 from calib.handeye import camera_position_error_m
-from cell.files.plan_file import read_plan
+from cell.storage.files.plan_file import read_plan
 from sim.log import tour
 from sim.presets import irb140_eosens
 from sim.synthesize import synthesize

@@ -9,11 +9,12 @@ from calib.calibration.baseline import fit_baseline
 from calib.calibration.frames import usable_frames
 from calib.calibration.pipeline import calibrate
 from calib.calibration.robot import hand_eye_of
+from calib.detection.same_order import same_order_everywhere
 from calib.views import Views
-from cell.calibrate import corners_of, same_order_everywhere
-from cell.files.plan_file import Plan, read_plan
-from cell.recording import read_recording
-from cell.simulate import simulate_corners
+from cell.storage.files.plan_file import Plan, read_plan
+from cell.storage.recording import read_recording
+from cell.storage.recording.detect import corners_of
+from cell.verbs.simulate import simulate_corners
 
 PLAN = Path(__file__).parents[2] / "configs" / "irb140-eosens-by-hand.plan.yaml"
 

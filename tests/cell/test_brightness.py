@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cell.diagnose.brightness import _trend, white_level
+from cell.verbs.diagnose.brightness import _trend, white_level
 
 
 def board_picture(white, dtype):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cell.cli.app import main
-from cell.recording import read_recording
+from cell.storage.recording import read_recording
 from tests.cell.plans import CELL, PLAN
 from tests.cell.recordings import HEADER, corner_rows, frame_line
 

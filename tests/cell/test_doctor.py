@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from calib.chain.kinematics import arm as kinematics_of
-from cell.doctor import examine
-from cell.doctor.finding import Finding
-from cell.factory import arm_of, camera_of
-from cell.files.cell_file import CellFile, read_cell
+from cell.devices.factory import arm_of, camera_of
+from cell.storage.files.cell_file import CellFile, read_cell
+from cell.verbs.doctor import examine
+from cell.verbs.doctor.finding import Finding
 from drivers import aravis_network
 from drivers.abb import ABBArm
 from drivers.aravis import AravisCamera
@@ -170,7 +170,7 @@ def test_a_camera_held_by_another_program_is_named(tmp_path: Path, gige: GigEPee
 def test_packets_and_buffers_that_are_too_small_are_named(
     tmp_path: Path, gige: GigEPeer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cell.doctor.gige.packet_bytes_for", lambda address: 1500)
+    monkeypatch.setattr("cell.verbs.doctor.gige.packet_bytes_for", lambda address: 1500)
     monkeypatch.setattr(aravis_network, "receive_buffer_limit_bytes", lambda: 1000)
     findings = examine(gige_cell(tmp_path, gige))
     assert "MTU" in by_name(findings, "packet size").line()

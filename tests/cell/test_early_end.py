@@ -15,21 +15,21 @@ from typer.testing import CliRunner
 from calib.calibration.running import fit_so_far
 from calib.views import Board, Views
 from cell.cli.app import app
+from cell.devices.factory import simulated_devices
+from cell.devices.simulated_cell import home_of, log_of, simulated_cell
 from cell.errors import InputError
-from cell.factory import simulated_devices
-from cell.files.plan_file import Plan, Until, read_plan
-from cell.recording import read_recording
-from cell.running_estimate.early_end import EarlyEnd
-from cell.running_estimate.estimate import Estimate
-from cell.running_estimate.process import RunningEstimate
-from cell.running_estimate.view_kinds import Sights, lacking, planned_flange_poses
 from cell.sequencer.journal import read_journal
 from cell.sequencer.sequencer import Devices
 from cell.sequencer.session import record_plan
 from cell.sequencer.states import Finish, State, Status
 from cell.sequencer.stop import StopRequest
 from cell.sequencer.watcher import Watcher
-from cell.simulated import home_of, log_of, simulated_cell
+from cell.storage.files.plan_file import Plan, Until, read_plan
+from cell.storage.recording import read_recording
+from cell.views.running_estimate.early_end import EarlyEnd
+from cell.views.running_estimate.estimate import Estimate
+from cell.views.running_estimate.process import RunningEstimate
+from cell.views.running_estimate.view_kinds import Sights, lacking, planned_flange_poses
 from sim.synthesize import synthesize
 from tests.cell.fakes import FakeArm, FakeCamera, FastClock
 from tests.cell.test_session import make_plan

@@ -7,9 +7,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from cell.errors import EXIT_INPUT, InputError
-from cell.files.cell_file import read_cell
-from cell.files.plan_file import read_plan
-from cell.files.schemas import FOLDER, MODELS, schema_text
+from cell.storage.files.cell_file import read_cell
+from cell.storage.files.plan_file import read_plan
+from cell.storage.files.schemas import FOLDER, MODELS, schema_text
 from drivers.errors import SafetyError
 from tests.cell.plans import CELL, PLAN
 
@@ -103,7 +103,9 @@ def test_a_view_may_hold_a_pose_and_the_log_of_a_recording(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("name", MODELS)
 def test_published_schemas_are_in_step(name: str) -> None:
-    assert (FOLDER / name).read_text() == schema_text(MODELS[name]), "python -m cell.files.schemas"
+    assert (FOLDER / name).read_text() == schema_text(MODELS[name]), (
+        "python -m cell.storage.files.schemas"
+    )
 
 
 @pytest.mark.parametrize(("name", "text"), [("cell.schema.json", CELL), ("plan.schema.json", PLAN)])

@@ -10,11 +10,11 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.views import FloatArray
 from cell.errors import BadAnswer, InputError
-from cell.importing import RotationName
-from cell.importing.conventions import Convention, conclude
-from cell.importing.importer import Described, import_source
-from cell.importing.pose_files import read_poses
-from cell.recording import read_recording
+from cell.storage.recording import read_recording
+from cell.verbs.importing import RotationName
+from cell.verbs.importing.conventions import Convention, conclude
+from cell.verbs.importing.importer import Described, import_source
+from cell.verbs.importing.pose_files import read_poses
 
 TURN = Rotation.from_rotvec([0.3, -0.5, 0.9])
 P_M = np.array([0.4, -0.2, 0.6])

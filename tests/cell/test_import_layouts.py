@@ -14,9 +14,9 @@ from calib.chain.rigid import inverse
 from calib.detection.orientation import pose_misfits
 from calib.views import FloatArray, Mount
 from cell.errors import InputError
-from cell.importing import RotationName
-from cell.importing.conventions import Convention, Witness, conclude
-from cell.importing.pose_files import RawPose, read_poses
+from cell.verbs.importing import RotationName
+from cell.verbs.importing.conventions import Convention, Witness, conclude
+from cell.verbs.importing.pose_files import RawPose, read_poses
 from tests.paper.scene import mixed_scene
 
 FRAMES = 9

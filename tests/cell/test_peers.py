@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import cell.peers
+import cell.devices.peers
 from calib.detection import Detection, detect
 from cell.cli.app import app
+from cell.devices.factory import peer_devices, simulated_devices
 from cell.errors import InputError
-from cell.factory import peer_devices, simulated_devices
-from cell.files.plan_file import Plan, read_plan
-from cell.recording import Recording, read_recording
 from cell.sequencer.journal import read_journal
 from cell.sequencer.session import record_plan
+from cell.storage.files.plan_file import Plan, read_plan
+from cell.storage.recording import Recording, read_recording
 from drivers.abb import ABBArm
 from drivers.aravis import AravisCamera
 from drivers.errors import DeviceRefused
@@ -108,8 +108,8 @@ def test_the_peers_end_with_the_run_that_fails(tmp_path: Path) -> None:
 
 def test_addresses_that_are_taken_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = short_plan(tmp_path, "ur3-robotiq", 1, "robotiq_wrist")
-    address = cell.peers._own_address()
-    monkeypatch.setattr(cell.peers, "_compile", lambda cell: None)
+    address = cell.devices.peers._own_address()
+    monkeypatch.setattr(cell.devices.peers, "_compile", lambda cell: None)
     with (
         socket.create_server((address, 30001)),
         pytest.raises(InputError, match="cannot listen"),

@@ -14,15 +14,15 @@ from calib.chain.optics import optics_row
 from calib.chain.projection import project
 from calib.views import FloatArray
 from cell.errors import InputError
-from cell.files.cell_file import CellFile, read_cell
-from cell.files.plan_file import Plan, PlanFile, read_plan
-from cell.files.writing import yaml_text
-from cell.planning import PlanSize, Wish, design_plan
-from cell.planning.pool import Pool
-from cell.planning.prospect import prospect_of
-from cell.planning.tour import nearest_next, shortened, shortest_tour
-from cell.planning.wish import fewest
 from cell.sequencer.guard import Guard
+from cell.storage.files.cell_file import CellFile, read_cell
+from cell.storage.files.plan_file import Plan, PlanFile, read_plan
+from cell.storage.files.writing import yaml_text
+from cell.verbs.plan import PlanSize, Requirements, design_plan
+from cell.verbs.plan.candidate_pool import CandidatePool
+from cell.verbs.plan.expected_uncertainty import expected_from
+from cell.verbs.plan.requirements import fewest
+from cell.verbs.plan.tour import nearest_next, shortened, shortest_tour
 from sim import presets
 from tests.cell.plans import CELL
 
@@ -70,15 +70,17 @@ def test_the_plans_that_come_along_are_as_good_as_what_the_planner_makes(name: s
     assert [kind.count("parallel") for kind in kinds] == [kinds[0].count("parallel")] * 2
     assert [len(kind) for kind in kinds] == [40, 40]
     # another processor may round one choice among near equals differently
-    told, kept = (prospect_of(Plan(stored.path, plan, stored.cell)) for plan in (made, stored.file))
+    told, kept = (
+        expected_from(Plan(stored.path, plan, stored.cell)) for plan in (made, stored.file)
+    )
     np.testing.assert_allclose(told.alpha_sigma_px, kept.alpha_sigma_px, rtol=0.05)
     np.testing.assert_allclose(told.projection_sigma_px, kept.projection_sigma_px, rtol=0.05)
     assert told.duration.whole_s == pytest.approx(kept.duration.whole_s, rel=0.2)
 
 
 @cache
-def pool(name: str) -> Pool:
-    return Pool(read_cell(CONFIGS / f"{name}.cell.yaml"), seed=1)
+def pool(name: str) -> CandidatePool:
+    return CandidatePool(read_cell(CONFIGS / f"{name}.cell.yaml"), seed=1)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -102,7 +104,7 @@ def test_the_fewest_views_for_a_goal_meet_it_and_one_less_does_not(
     assert candidates.alpha_sigma_px(candidates.choose(size)) <= 0.16
     less = PlanSize.of(size.frames - 1)
     assert candidates.alpha_sigma_px(candidates.choose(less)) > 0.16
-    monkeypatch.setattr("cell.planning.wish.MOST_FRAMES", 16)
+    monkeypatch.setattr("cell.verbs.plan.requirements.MOST_FRAMES", 16)
     with pytest.raises(InputError, match="16 views promise alpha to"):
         fewest(candidates, 0.001, seed=1)
 
@@ -161,7 +163,7 @@ def test_views_keep_out_of_the_boxes_and_the_plan_says_what_it_promises() -> Non
     plan = Plan(Path("made.plan.yaml"), design_plan(cell, PlanSize(3, 9)), cell)
     guard = Guard.of(plan)
     assert len(guard.check_plan(plan, np.radians(cell.layout.home_deg))) == 12
-    told = prospect_of(plan)
+    told = expected_from(plan)
     assert told.noise_from.startswith("assumed")
     assert (np.diff(told.distance_m) > 0).all()
     for sigma in (told.alpha_sigma_px, told.projection_sigma_px, told.workpiece_sigma_m):
@@ -178,24 +180,24 @@ def test_views_keep_out_of_the_boxes_and_the_plan_says_what_it_promises() -> Non
 @pytest.mark.parametrize(
     ("wish", "message"),
     [
-        (Wish(40, 10, 30), "give two of --frames, --parallel and --varied"),
-        (Wish(10, 12), "--frames is less than"),
-        (Wish(frames=20, alpha_sigma_px=0.1), "says how many views by itself"),
+        (Requirements(40, 10, 30), "give two of --frames, --parallel and --varied"),
+        (Requirements(10, 12), "--frames is less than"),
+        (Requirements(frames=20, alpha_sigma_px=0.1), "says how many views by itself"),
     ],
 )
-def test_wishes_that_contradict_each_other_are_said(wish: Wish, message: str) -> None:
+def test_wishes_that_contradict_each_other_are_said(wish: Requirements, message: str) -> None:
     with pytest.raises(InputError, match=message):
         wish.size_for(bench())
 
 
 def test_wishes_make_sizes() -> None:
     sizes = {
-        Wish(): (10, 30),
-        Wish(frames=20): (5, 15),
-        Wish(frames=20, parallel=8): (8, 12),
-        Wish(frames=20, varied=14): (6, 14),
-        Wish(parallel=4): (4, 30),
-        Wish(parallel=4, varied=6): (4, 6),
+        Requirements(): (10, 30),
+        Requirements(frames=20): (5, 15),
+        Requirements(frames=20, parallel=8): (8, 12),
+        Requirements(frames=20, varied=14): (6, 14),
+        Requirements(parallel=4): (4, 30),
+        Requirements(parallel=4, varied=6): (4, 6),
     }
     for wish, (parallel, varied) in sizes.items():
         assert wish.size_for(bench()) == PlanSize(parallel, varied)
@@ -208,7 +210,7 @@ def test_wishes_make_sizes() -> None:
     [("irb140-eosens", presets.irb140_eosens), ("ur3-robotiq", presets.ur3_robotiq)],
 )
 def test_the_cells_that_come_along_are_the_simulators_presets(name: str, preset) -> None:  # type: ignore[no-untyped-def]
-    from cell.simulated import home_of, simulated_cell
+    from cell.devices.simulated_cell import home_of, simulated_cell
 
     plan = read_plan(CONFIGS / f"{name}.plan.yaml")
     ours, theirs = simulated_cell(plan.cell, home_of(plan)), preset()

@@ -9,8 +9,14 @@ import numpy as np
 import pytest
 
 from cell.errors import EXIT_INPUT, InputError
-from cell.recording import Corners, FrameRecord, RecordingWriter, read_recording, write_corners
-from cell.recording.header import Header
+from cell.storage.recording import (
+    Corners,
+    FrameRecord,
+    RecordingWriter,
+    read_recording,
+    write_corners,
+)
+from cell.storage.recording.header import Header
 from tests.cell.recordings import HEADER, corner_rows, frame_line
 
 Folder = Callable[..., Path]

@@ -20,9 +20,6 @@ from cell.errors import (
     EXIT_SAFETY,
     InputError,
 )
-from cell.files.parts import Box
-from cell.files.plan_file import Plan, View, read_plan
-from cell.recording import Header, RecordingWriter, read_recording
 from cell.sequencer import checks
 from cell.sequencer import sequencer as sequencer_module
 from cell.sequencer.checks import Verdict
@@ -36,6 +33,9 @@ from cell.sequencer.sequencer import Devices, Sequencer
 from cell.sequencer.states import Finish, RunResult, State, Status
 from cell.sequencer.stop import StopRequest, signals_ask
 from cell.sequencer.watcher import Checked, Watcher
+from cell.storage.files.parts import Box
+from cell.storage.files.plan_file import Plan, View, read_plan
+from cell.storage.recording import Header, RecordingWriter, read_recording
 from drivers.arm import ArmState
 from drivers.camera import Frame
 from drivers.errors import DeviceUnreachable, FrameLost, SafetyError, StopFailed

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from cell.errors import InputError
-from cell.files.plan_file import Plan, read_plan
-from cell.recording import read_recording
 from cell.sequencer.journal import Journal, read_journal
 from cell.sequencer.sequencer import Devices
 from cell.sequencer.session import record_plan
 from cell.sequencer.states import Finish
+from cell.storage.files.plan_file import Plan, read_plan
+from cell.storage.recording import read_recording
 from tests.cell.fakes import FakeArm, FakeCamera, FastClock
 from tests.cell.plans import CELL, PLAN
 
@@ -103,7 +103,7 @@ def test_two_runs_do_not_write_one_recording(tmp_path: Path) -> None:
 SCRIPT = """
     import sys, time
     from pathlib import Path
-    from cell.files.plan_file import read_plan
+    from cell.storage.files.plan_file import read_plan
     from cell.sequencer.sequencer import Devices
     from cell.sequencer.session import record_plan
     from tests.cell.fakes import FakeArm, FakeCamera

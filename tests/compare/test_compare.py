@@ -17,13 +17,13 @@ from calib.calibration import calibrate
 from calib.calibration.mapping import as_mapping
 from calib.chain.rigid import from_vector
 from cell.cli.app import app
-from cell.compare import Side, compare, side_of
-from cell.compare.field import differences, field_of
-from cell.compare.page import render
-from cell.compare.side import NAMES, PLACE
-from cell.compare.sources import source_of
 from cell.errors import InputError
-from cell.export import CalibrationSource
+from cell.verbs.compare import Side, compare, side_of
+from cell.verbs.compare.field import differences, field_of
+from cell.verbs.compare.page import render
+from cell.verbs.compare.side import NAMES, PLACE
+from cell.verbs.compare.sources import source_of
+from cell.verbs.export import CalibrationSource
 from tests.export.calibrations import MOVING, STILL, with_joint, write
 from tests.paper.scene import mixed_scene
 
@@ -246,9 +246,9 @@ def test_a_recording_is_calibrated_on_the_way(
     write(tmp_path, STILL)
     mapping = json.loads((tmp_path / "calibration.json").read_text())
     (tmp_path / "calibration.json").unlink()
-    monkeypatch.setattr("cell.recording.read_recording", lambda path: path)
+    monkeypatch.setattr("cell.storage.recording.read_recording", lambda path: path)
     monkeypatch.setattr(
-        "cell.calibrate.calibrate_recording", lambda path: SimpleNamespace(mapping=mapping)
+        "cell.verbs.calibrate.calibrate_recording", lambda path: SimpleNamespace(mapping=mapping)
     )
     assert source_of(tmp_path).recording == "bench"
     assert list(tmp_path.iterdir()) == []

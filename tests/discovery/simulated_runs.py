@@ -17,8 +17,9 @@ from calib.chain.rigid import compose, inverse
 from calib.solver.noise import Noise
 from calib.solver.pose_information import shown
 from calib.views import Board, FloatArray, Views
-from cell.recording import Recording
-from cell.recording.header import Header, board_file
+from cell.storage.files.board_file import board_file
+from cell.storage.recording import Recording
+from cell.storage.recording.header import Header
 from sim.arm import Repeatability
 from sim.cell import CameraSpec, SimulatedCell
 from sim.log import tour

@@ -12,8 +12,8 @@ from calib.chain.kinematics import arm
 from calib.discovery.bookkeeping.slip import Slip
 from calib.discovery.books import Books, keep_books
 from calib.views import Views
-from cell.files.cell_file import EffectFile
-from cell.log_slips import _scalar_first, slip
+from cell.devices.log_mixups import _scalar_first, slip
+from cell.storage.files.cell_file import EffectFile
 from tests.discovery.simulated_runs import log, plain_cell, record
 
 CLEAN = record(plain_cell(), log(30), seed=41)

@@ -11,10 +11,10 @@ from calib.chain.effects import find_effect, make_effect
 from calib.discovery.design.choose import contest
 from calib.discovery.diagnose import diagnose
 from calib.discovery.diagnosis import Ambiguity
-from cell.diagnose.separate import POSES, separations
-from cell.files.plan_file import read_plan
+from cell.devices.simulated_cell import home_of, log_of, simulated_cell
 from cell.sequencer.guard import Guard
-from cell.simulated import home_of, log_of, simulated_cell
+from cell.storage.files.plan_file import read_plan
+from cell.verbs.diagnose.separate import POSES, separations
 from tests.discovery.simulated_runs import log, plain_cell, record, recording
 
 

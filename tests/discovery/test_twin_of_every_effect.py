@@ -17,9 +17,9 @@ from calib.discovery.locate import locate
 from calib.discovery.search import Search
 from calib.discovery.start import Fitter
 from calib.views import FloatArray, Views
-from cell.diagnose.twin import twin_text
-from cell.files.plan_file import read_plan
-from cell.simulated import home_of, log_of, simulated_cell
+from cell.devices.simulated_cell import home_of, log_of, simulated_cell
+from cell.storage.files.plan_file import read_plan
+from cell.verbs.diagnose.twin import twin_text
 from sim.synthesize import synthesize
 from tests.discovery.simulated_runs import log, plain_cell, record, recording
 

@@ -13,8 +13,8 @@ from typer.main import get_command
 
 from cell.cli.app import VERBS, app
 from cell.errors import EXIT_SAFETY
-from cell.files.plan_file import read_plan
-from cell.simulate import with_effects
+from cell.storage.files.plan_file import read_plan
+from cell.verbs.simulate import with_effects
 from tests.docs.pages import ROOT, assert_same, blocks, commands, run_command
 from tools import reference_pages
 from tools.effect_pages import FOLDER, pages

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from cell.files.cell_file import AbbRobot, CellFile, UniversalRobot
-from cell.files.plan_file import read_plan
-from cell.recording import Corners, read_recording
+from cell.storage.files.cell_file import AbbRobot, CellFile, UniversalRobot
+from cell.storage.files.plan_file import read_plan
+from cell.storage.recording import Corners, read_recording
 from tests.cell.test_peers import SMALL
 from tests.docs.pages import ROOT, blocks, commands, run_command
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from calib.chain.projection import project
 from calib.views import FloatArray
-from cell.export import Camera
+from cell.verbs.export import Camera
 
 STILL: dict[str, Any] = {
     "schema": "cell.calibration/1",

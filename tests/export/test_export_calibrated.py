@@ -15,9 +15,9 @@ from calib.chain.model import walk
 from calib.chain.projection import project
 from calib.views import Board, FloatArray, Views
 from cell.errors import InputError
-from cell.export import export_calibration
-from cell.export.reading import CalibrationSource
-from cell.verify.old_cell import old_cell
+from cell.storage.files.calibration_source import CalibrationSource
+from cell.verbs.export import export_calibration
+from cell.verbs.verify.old_cell import old_cell
 from tests.export.test_export_tools import AGREES_PX, MRCAL, MRCAL_PROJECTS
 from tests.verify.new_views import calibration_text
 

@@ -13,9 +13,9 @@ from ruamel.yaml import YAML
 
 from calib.views import FloatArray
 from cell.errors import InputError
-from cell.export import Camera
-from cell.export.formats import colmap, kalibr, mrcal, opencv, ros
-from cell.export.reading import DISTORTION
+from cell.storage.files.calibration_source import DISTORTION
+from cell.verbs.export import Camera
+from cell.verbs.export.formats import colmap, kalibr, mrcal, opencv, ros
 from tests.export.calibrations import DISTORTIONS, POINTS_M, own_projection
 
 AGREES_PX = 1e-6

@@ -16,7 +16,7 @@ from calib.calibration.mapping import as_mapping
 from calib.chain.optics import COLUMN
 from cell.cli.app import app
 from cell.errors import InputError
-from cell.export import FORMATS, export_calibration, read_calibration
+from cell.verbs.export import FORMATS, export_calibration, read_calibration
 from tests.export.calibrations import FOCUS, MOVING, STILL, with_joint, write
 from tests.paper.scene import ALPHA0, BETA0, mixed_scene
 

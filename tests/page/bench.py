@@ -15,12 +15,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from calib.detection import Detection
-from cell.files.plan_file import Plan, read_plan
-from cell.page.address import Address
-from cell.page.application import OWN_HEADER
-from cell.page.live_run import LiveRun
-from cell.page.server import LivePage
-from cell.recording import FrameRecord, PoseRecord, RecordingWriter
+from cell.devices.simulated_cell import home_of, simulated_cell
 from cell.sequencer.checks import Verdict
 from cell.sequencer.journal import Journal
 from cell.sequencer.sequencer import Devices, Sequencer
@@ -28,7 +23,12 @@ from cell.sequencer.session import header_of
 from cell.sequencer.shot import Shot
 from cell.sequencer.states import RunResult, State, Status
 from cell.sequencer.watcher import Checked
-from cell.simulated import home_of, simulated_cell
+from cell.storage.files.plan_file import Plan, read_plan
+from cell.storage.recording import FrameRecord, PoseRecord, RecordingWriter
+from cell.views.page.address import Address
+from cell.views.page.application import OWN_HEADER
+from cell.views.page.live_run import LiveRun
+from cell.views.page.server import LivePage
 from drivers.camera import Frame
 from sim.build import build
 from sim.clock import WallClock

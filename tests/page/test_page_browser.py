@@ -12,11 +12,11 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.ui import WebDriverWait
 
-from cell.page import live_run
-from cell.page.address import Address
-from cell.page.live_run import LiveRun
-from cell.recording import read_recording
 from cell.sequencer.states import Finish, State
+from cell.storage.recording import read_recording
+from cell.views.page import live_run
+from cell.views.page.address import Address
+from cell.views.page.live_run import LiveRun
 from tests.page.bench import RealTimeRun, checked, free_port, plan_of, served, status
 
 PATIENCE_S = 90.0

@@ -20,13 +20,13 @@ from typer.testing import CliRunner
 from cell.cli.app import app
 from cell.cli.page_option import with_addresses
 from cell.errors import EXIT_OPERATOR, InputError
-from cell.page.address import DEFAULT, Address, is_address
-from cell.page.application import MOST_STREAMS
-from cell.page.live_run import LiveRun
-from cell.page.picture import jpeg
-from cell.recording import read_recording
-from cell.running_estimate.estimate import Estimate
 from cell.sequencer.states import Finish, RunResult, State
+from cell.storage.recording import read_recording
+from cell.views.page.address import DEFAULT, Address, is_address
+from cell.views.page.application import MOST_STREAMS
+from cell.views.page.live_run import LiveRun
+from cell.views.page.picture import jpeg
+from cell.views.running_estimate.estimate import Estimate
 from tests.page.bench import ask, checked, connect, events, plan_of, press, served, status
 
 
@@ -226,7 +226,7 @@ def test_a_run_that_hangs_is_told_as_hanging(
     live.read(checked(live._plan).shot.states[0])
     assert live.now()["silent_s"] == 0
     later = time.monotonic() + 7.0
-    monkeypatch.setattr("cell.page.live_run.time.monotonic", lambda: later)
+    monkeypatch.setattr("cell.views.page.live_run.time.monotonic", lambda: later)
     assert live.now()["silent_s"] == pytest.approx(7.0, abs=0.5)
     live.told(status(State.FINISHED))
     assert live.now()["silent_s"] == 0

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from calib.chain.rigid import inverse
 from calib.views import Board, FloatArray, Views
-from cell.report import Evidence, ReportData, SolutionPoses, Truth
-from cell.report.geometry import distance_m, position_error_m
+from cell.views.report import Evidence, ReportData, SolutionPoses, Truth
+from cell.views.report.geometry import distance_m, position_error_m
 
 WIDTH_PX, HEIGHT_PX = 1279, 724
 BOARD = Board("chessboard", 7, 10, 0.025)

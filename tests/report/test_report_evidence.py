@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from calib.chain.effects import catalogue
-from cell.report.data import ReportData
-from cell.report.evidence import EVIDENCE, picture_of, remedy_of
-from cell.report.evidence.arm import named_joint
-from cell.report.figures.canvas import inline_svg
+from cell.views.report.data import ReportData
+from cell.views.report.evidence import EVIDENCE, picture_of, remedy_of
+from cell.views.report.evidence.arm import named_joint
+from cell.views.report.figures.canvas import inline_svg
 
 BOOKKEEPING = (
     "frame_pose_offset",

@@ -11,9 +11,9 @@ import made_up_cell
 import pytest
 
 from calib.views import Views
-from cell.files.calibration_file import CalibrationFile
-from cell.files.diagnosis_file import DiagnosisFile
-from cell.report import ReportData, write_report
+from cell.storage.files.calibration_file import CalibrationFile
+from cell.storage.files.diagnosis_file import DiagnosisFile
+from cell.views.report import ReportData, write_report
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 

@@ -12,10 +12,10 @@ from calib.chain.effects import make_effect
 from calib.chain.model import CellModel, predict
 from calib.chain.optics import optics_row
 from calib.views import Board, Views
-from cell.report.from_diagnosis import diagnosis_evidence
-from cell.report.from_simulation import simulation_truth
-from cell.report.geometry import distance_m
-from cell.report.pose_errors import pose_errors, scale_at_robot_depth, without_constant_part
+from cell.views.report.from_diagnosis import diagnosis_evidence
+from cell.views.report.from_simulation import simulation_truth
+from cell.views.report.geometry import distance_m
+from cell.views.report.pose_errors import pose_errors, scale_at_robot_depth, without_constant_part
 
 ALPHA_PX = 1500.0
 

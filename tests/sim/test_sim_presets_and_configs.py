@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cell.files.cell_file import read_cell
-from cell.simulated import simulated_cell
+from cell.devices.simulated_cell import simulated_cell
+from cell.storage.files.cell_file import read_cell
 from sim.presets import irb140_eosens, ur3_robotiq
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -18,7 +18,7 @@ from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
 from calib.solver.joint import JointFit
 from calib.views import FloatArray, Mount, Views
-from cell.files.calibration_file import CalibrationFile
+from cell.storage.files.calibration_file import CalibrationFile
 from tests.calibration.fitted import K1, THIN_F_M, fit
 from tests.paper.scene import (
     ALPHA0,

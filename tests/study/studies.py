@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cell.files.plan_file import read_plan
-from cell.files.study_file import Study, read_study
-from cell.files.writing import yaml_text
+from cell.storage.files.plan_file import read_plan
+from cell.storage.files.study_file import Study, read_study
+from cell.storage.files.writing import yaml_text
 
 PLAN = Path(__file__).parents[2] / "configs" / "irb140-eosens-by-hand.plan.yaml"
 

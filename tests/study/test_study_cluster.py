@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
-from cell.study.folder import RESULTS
+from cell.verbs.study.folder import RESULTS
 from tests.study.studies import seeds, write_study
 
 Process = subprocess.Popen[bytes]

@@ -9,9 +9,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from cell.errors import InputError
-from cell.files.schemas import FOLDER
-from cell.study.kinds import kind_of
-from cell.study.kinds.power import NONE
+from cell.storage.files.schemas import FOLDER
+from cell.verbs.study.kinds import kind_of
+from cell.verbs.study.kinds.power import NONE
 from tests.study.studies import seeds, study, write_study
 
 CASES = """\

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from cell.files.study_file import StudyFile
-from cell.files.yaml_model import parse_model, read_mapping
+from cell.storage.files.study_file import StudyFile
+from cell.storage.files.yaml_model import parse_model, read_mapping
 from tests.docs.pages import ROOT, assert_same, blocks, commands, run_command, run_python
 
 PAGE = ROOT / "docs" / "study.md"

@@ -21,16 +21,16 @@ import pytest
 from distributed import LocalCluster
 
 from cell.cli.app import main
-from cell.doctor import examine
 from cell.errors import InputError
-from cell.files.plan_file import read_plan
-from cell.files.study_file import read_study
-from cell.simulate import simulate_corners, with_truth
-from cell.study import cluster, extra, run
-from cell.study.folder import FAILURES, MANIFEST, RESULTS, StudyFolder
-from cell.study.kinds import kind_of
-from cell.study.run import Outcome, run_study
-from cell.study.trial import truth_of
+from cell.storage.files.plan_file import read_plan
+from cell.storage.files.study_file import read_study
+from cell.verbs.doctor import examine
+from cell.verbs.simulate import simulate_corners, with_truth
+from cell.verbs.study import cluster, extra, run
+from cell.verbs.study.folder import FAILURES, MANIFEST, RESULTS, StudyFolder
+from cell.verbs.study.kinds import kind_of
+from cell.verbs.study.run import Outcome, run_study
+from cell.verbs.study.trial import truth_of
 from tests.study.killers import KILLER, kill_or_work
 from tests.study.studies import seeds, study, write_plan, write_study
 
@@ -371,7 +371,7 @@ def test_the_doctor_names_what_is_missing_and_does_not_mind(
             raise PackageNotFoundError(name)
         return "1.0"
 
-    monkeypatch.setattr(import_module("cell.doctor.installed"), "version", installed)
+    monkeypatch.setattr(import_module("cell.verbs.doctor.installed"), "version", installed)
     told = {finding.name: finding for finding in examine(None)}
     for name in extra.PACKAGES:
         assert not told[name].ready

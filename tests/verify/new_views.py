@@ -14,8 +14,8 @@ from calib.chain.model import CellModel, predict
 from calib.chain.optics import optics_row
 from calib.chain.rigid import from_vector
 from calib.views import FloatArray, Mount, Views
-from cell.export import CalibrationSource
-from cell.verify.old_cell import OldCell, old_cell
+from cell.verbs.export import CalibrationSource
+from cell.verbs.verify.old_cell import OldCell, old_cell
 from tests.paper.scene import (
     ALPHA0,
     BASE_FROM_FIXED,

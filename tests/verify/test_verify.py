@@ -10,14 +10,14 @@ import pytest
 from calib.chain.rigid import from_vector
 from calib.views import Mount, Views
 from cell.errors import InputError
-from cell.export import CalibrationSource
-from cell.files.verify_file import VerifyFile
-from cell.verify.check import Checked, check
-from cell.verify.length import KnownLength
-from cell.verify.old_cell import old_cell
-from cell.verify.page import render
-from cell.verify.short_plan import choose_views
-from cell.verify.words import text
+from cell.storage.files.verify_file import VerifyFile
+from cell.verbs.export import CalibrationSource
+from cell.verbs.verify.check import Checked, check
+from cell.verbs.verify.length import KnownLength
+from cell.verbs.verify.messages import text
+from cell.verbs.verify.old_cell import old_cell
+from cell.verbs.verify.page import render
+from cell.verbs.verify.short_plan import choose_views
 from tests.verify.new_views import calibration_text, new_views, old
 
 MOUNTS: tuple[Mount, ...] = ("eye_in_hand", "eye_to_hand")

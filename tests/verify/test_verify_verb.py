@@ -10,7 +10,7 @@ import jsonschema
 import pytest
 
 from cell.cli.app import main
-from cell.files.schemas import FOLDER
+from cell.storage.files.schemas import FOLDER
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 PLAN = CONFIGS / "ur3-robotiq.plan.yaml"

@@ -1,0 +1,1 @@
+"""The cell put together: real, simulated and peer devices; imports the sequencer and below."""

@@ -1,8 +1,0 @@
-"""`cell diagnose`: compare the simulated cell with a recording, and say what differs.
-
-Public: `diagnose_into`.
-"""
-
-from cell.diagnose.verb import diagnose_into
-
-__all__ = ["diagnose_into"]

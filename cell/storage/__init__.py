@@ -1,0 +1,1 @@
+"""Files and recordings, read and written; imports nothing of the cell above it."""

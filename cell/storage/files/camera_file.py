@@ -1,0 +1,101 @@
+"""The `camera` of a cell file: which driver, at which address, and the names of its features."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, PositiveInt
+
+from cell.storage.files.parts import Part, Positive
+
+
+class Lens(Part):
+    """The lens, as its barrel says."""
+
+    focal_length_mm: Positive
+    f_number: Positive = 4.0
+
+
+class SimulatedCamera(Part):
+    """A camera in this process, and what all cameras have in common."""
+
+    driver: Literal["sim"]
+    model: str | None = None
+    width: PositiveInt
+    height: PositiveInt
+    pixel_size_um: Positive | None = None
+    focus: Literal["auto", "manual", "motorised", "fixed"] | None = None
+    lens: Lens | None = None
+
+
+class FeatureNamesFile(Part):
+    """A vendor's own feature names, where they are not those of GenICam's SFNC."""
+
+    exposure: str | None = None
+    """Exposure time; ExposureTime or ExposureTimeAbs where it is not given."""
+    exposure_unit_s: Positive = 1e-6
+    """Seconds in one unit of it."""
+    gain: str | None = None
+    """Gain; Gain where it is not given."""
+    gain_is_factor: bool = False
+    """The gain is a linear factor and not in dB."""
+    temperature: str | None = None
+    """Temperature of the camera, °C; DeviceTemperature where it is not given."""
+    focus_selector: str | None = None
+    """Which lens controller; OpticControllerSelector where it is not given."""
+    focus_controller: str | None = None
+    """The selector's entry, such as Optic1; left as it is where it is not given."""
+    focus_position: str | None = None
+    """Position of the focus drive, in its steps; FocusStepper where it is not given."""
+    focus_auto: str | None = None
+    """Automatic focus; FocusAuto where it is not given."""
+    focus_status: str | None = None
+    """Whether the lens is ready; FocusStatus or OpticControllerStatus where it is not given."""
+
+
+class GenicamOptionsFile(SimulatedCamera):
+    """What all cameras with GenICam features have in common."""
+
+    driver: Literal["gige", "genicam"]  # type: ignore[assignment]
+    pixel_format: str = "Mono8"
+    features: dict[str, str | float | int | bool] = Field(default_factory=dict)
+    """GenICam features to set once at start, by name."""
+    software_trigger: bool = True
+    """False for a camera that cannot be triggered and streams by itself."""
+    feature_names: FeatureNamesFile = FeatureNamesFile()
+
+
+class GigeCamera(GenicamOptionsFile):
+    """A GigE Vision camera, through Aravis."""
+
+    driver: Literal["gige"]
+    address: str
+    """IP address of the camera."""
+    packet_bytes: int | None = Field(default=None, ge=576, le=16384)
+    """Stream packet size with IP and UDP headers; what the network carries where it is null."""
+
+
+class GenicamCamera(GenicamOptionsFile):
+    """A camera behind a GenTL producer (CoaXPress grabbers), through harvesters."""
+
+    driver: Literal["genicam"]
+    producer: Path
+    """The vendor's .cti file."""
+    serial: str | None = None
+    """Serial number; where it is not given the producer must show one camera only."""
+
+
+class RobotiqCamera(SimulatedCamera):
+    """A Robotiq wrist camera, over HTTP."""
+
+    driver: Literal["robotiq"]  # type: ignore[assignment]
+    address: str
+    """The robot's address, with `:port` where it is not 4242."""
+    display_size: tuple[PositiveInt, PositiveInt] | None = None
+    """Width and height to ask the server for; pictures are taken as they come where it is null."""
+
+
+CameraFile = Annotated[
+    SimulatedCamera | GigeCamera | GenicamCamera | RobotiqCamera, Field(discriminator="driver")
+]

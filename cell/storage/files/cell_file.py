@@ -1,0 +1,170 @@
+"""`cell.yaml`: the arm, the camera, the board, where things stand, and what the truth is.
+
+The section `simulation` holds the truth of a simulated cell and is looked at by a dry run only;
+`layout` is what a tape measure gives, good enough to plan poses and to refuse unsafe ones.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import ConfigDict, Field
+
+from calib.views import Mount
+from cell.storage.files.board_file import Charuco, Chessboard
+from cell.storage.files.camera_file import CameraFile
+from cell.storage.files.parts import Box, Finite, Joints, Part, Pose, Positive
+from cell.storage.files.yaml_model import read_model
+
+SCHEMA: Final = "cell.cell/1"
+
+
+class CellChessboard(Chessboard):
+    """A chessboard; a key it does not know is an error."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class CellCharuco(Charuco):
+    """A ChArUco board; a key it does not know is an error."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+BoardFile = Annotated[CellChessboard | CellCharuco, Field(discriminator="type")]
+
+
+class SimulatedRobot(Part):
+    """An arm in this process."""
+
+    driver: Literal["sim"]
+    model: str | None
+    """Kinematic model: ur3, ur3e, ur5, ur5e, ur10, ur10e, ur16e, irb140; null where it is unknown,
+    for a cell that is simulated at logged poses and never moved."""
+    payload_kg: float = Field(default=0.0, ge=0)
+    """Mass of camera and bracket at the flange."""
+
+
+class UniversalRobot(SimulatedRobot):
+    """A Universal Robots controller, e-Series or CB3."""
+
+    driver: Literal["ur"]  # type: ignore[assignment]
+    address: str
+    """Name or IP address of the controller."""
+    upper_registers: bool = False
+    """Use RTDE registers 24 to 47, where a fieldbus or another client holds the lower ones."""
+
+
+class AbbRobot(SimulatedRobot):
+    """An ABB IRC5 controller with Robot Web Services."""
+
+    driver: Literal["abb"]  # type: ignore[assignment]
+    address: str
+    """Name or IP address of the controller, with `:port` where it is not 80."""
+    user: str = "Default User"
+    password: str = "robotics"
+    """The controller's factory default; give your own where it was changed."""
+    link_watch: bool = True
+    """The controller stops a motion by itself when this computer falls silent, for which
+    `cell_watch.mod` must be loaded there; with false, a cut cable stops nothing."""
+    egm_port: int | None = Field(default=None, gt=0, lt=65536)
+    """UDP port of this computer where the controller's EGM feedback arrives; null for none."""
+
+
+RobotFile = Annotated[SimulatedRobot | UniversalRobot | AbbRobot, Field(discriminator="driver")]
+
+
+class Layout(Part):
+    """Where things stand, to a centimetre or two: for planning and for refusing unsafe moves."""
+
+    mounted: Pose
+    """flange_from_camera (eye in hand) or flange_from_board (eye to hand)."""
+    fixed: Pose
+    """base_from_board (eye in hand) or base_from_camera (eye to hand)."""
+    home_deg: Joints
+    """Joint angles to start from and to plan around."""
+    distances_m: tuple[Positive, Positive]
+    """Nearest and farthest distance of the board's centre from the camera worth planning."""
+    alpha_px: Positive | None = None
+    """The camera's scale factor to a few percent; from lens and pixel size where it is null."""
+
+
+class EffectFile(Part):
+    """One effect by its name in the catalogue, with its values."""
+
+    name: str
+    law: str | None = None
+    parameters: dict[str, Finite | tuple[Finite, ...]] = Field(default_factory=dict)
+    """By name, with the unit in it; a list stands for the numbered parameters of that stem."""
+
+
+class Noise(Part):
+    """What scatters in the simulated cell; all are one-sigma."""
+
+    corner_px: float = Field(default=0.0, ge=0)
+    """Of detected corners, where corners are made without pictures."""
+    arm_position_m: float = Field(default=0.0, ge=0)
+    """Repeatability of the flange's position, per axis."""
+    arm_rotation_rad: float = Field(default=0.0, ge=0)
+    """Repeatability of the flange's rotation, per axis."""
+    read_levels: float = Field(default=0.5, ge=0)
+    """The sensor's read noise, in levels of an 8-bit image."""
+    full_well_electrons: Positive | None = 10_000.0
+    """Electrons at which a pixel is full; null for light without photon noise."""
+
+
+class SimulatedLens(Part):
+    """What the picture's sharpness follows from."""
+
+    best_blur_px: float = Field(default=0.5, ge=0)
+    """Blur at best focus, Gaussian sigma."""
+    focus_distance_m: Positive | None = None
+    """Where the lens stands focused at first; at the board, as the first pose sees it, if null."""
+    nearest_focus_m: Positive = 0.1
+    """Nearest distance of the focus drive."""
+
+
+class Simulation(Part):
+    """The truth of a simulated cell."""
+
+    mounted: Pose
+    """As in `layout`, exactly."""
+    fixed: Pose
+    """As in `layout`, exactly."""
+    optics: dict[str, Finite]
+    """Columns of the chain's optics: alpha_px, beta_px, skew_px, u0_px, v0_px, k1, k2, ..."""
+    effects: tuple[EffectFile, ...] = ()
+    """What a plain model leaves out."""
+    noise: Noise = Noise()
+    lens: SimulatedLens = SimulatedLens()
+    white_exposure_s: Positive = 0.012
+    """Exposure at which a white board is just not saturated: how well the cell is lit."""
+    seed: int = Field(default=0, ge=0)
+
+
+class CellFile(Part):
+    """The whole of a cell file."""
+
+    schema_: Literal["cell.cell/1"] = Field(default=SCHEMA, alias="schema")
+    name: str
+    robot: RobotFile
+    camera: CameraFile
+    board: BoardFile
+    mount: Mount = "eye_in_hand"
+    layout: Layout | None = None
+    workspace: Box | None = None
+    """The arm's links and the camera stay inside this box."""
+    keep_out: tuple[Box, ...] = ()
+    """They stay out of these."""
+    simulation: Simulation | None = None
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Plain dicts and lists, keys as in the file, defaults left out."""
+        data = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+        return {"schema": SCHEMA, **data}
+
+
+def read_cell(path: Path) -> CellFile:
+    """Read a cell file; raises `InputError` with every error in it."""
+    return read_model(path, CellFile, schema=SCHEMA)

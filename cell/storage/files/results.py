@@ -1,0 +1,50 @@
+"""Where results go, and how they are written: each file whole, older ones of its name replaced."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from cell.errors import InputError
+
+
+def results_folder(recording: Path, name: str, kind: str) -> Path:
+    """Where results go without `-o`: into the recording, or here where that is read-only.
+
+    Parameters
+    ----------
+    recording, name:
+        The recording's folder, and what it is called.
+    kind:
+        What the results are: the name of their folder.
+    """
+    if os.access(recording, os.W_OK):
+        return recording / kind
+    return Path.cwd() / f"{name}-{kind}"
+
+
+def write_results(folder: Path, files: Mapping[str, str]) -> None:
+    """Write texts by their file names; raises `InputError` where the folder cannot be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            partial = folder / f"{name}.part"
+            partial.write_text(content, encoding="utf-8")
+            partial.replace(folder / name)
+    except OSError as fault:
+        raise InputError(
+            f"{folder}: cannot be written: {fault.strerror}; give another -o"
+        ) from None
+
+
+def new_folder(name: str) -> Path:
+    """A folder under `runs/` for results whose place was not given."""
+    same = same_folder(name)
+    return same.with_name(f"{same.name}-{time.strftime('%Y%m%d-%H%M%S')}")
+
+
+def same_folder(name: str) -> Path:
+    """The folder under `runs/` of what goes on where it was left."""
+    return Path("runs") / "".join(c if c.isalnum() or c in "-_" else "-" for c in name).strip("-")

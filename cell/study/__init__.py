@@ -1,4 +1,0 @@
-"""Studies that outgrow one machine: many simulated runs or many recordings, on Dask distributed.
-
-Needs the extra `study`; `cell.study.extra` says so where it is missing.
-"""

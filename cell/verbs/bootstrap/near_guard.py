@@ -1,0 +1,105 @@
+"""A guard that allows for what is not known, and keeps the arm near the pose it started from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
+
+from calib.chain import rigid
+from calib.views import FloatArray
+from cell.errors import InputError
+from cell.sequencer.guard import Guard, outline_m
+from cell.storage.files.cell_file import CellFile
+from cell.storage.files.parts import Box
+from cell.verbs.bootstrap.layout_doubt import LayoutDoubt
+from drivers.errors import SafetyError
+
+SPEED_M_S = 0.05
+JOINT_SPEED_DEG_S = 10.0
+FARTHEST_M = 0.15
+FARTHEST_RAD = float(np.radians(25.0))
+TRAVEL_RAD = np.radians([25.0, 25.0, 25.0, 60.0, 60.0, 60.0])
+"""The wrist turns far for small tilts; the arm itself hardly moves."""
+
+
+@dataclass(frozen=True)
+class NearGuard(Guard):
+    """Refuses whatever leads away from where the arm stood.
+
+    Attributes
+    ----------
+    start_rad:
+        (6,) where it stood.
+    """
+
+    start_rad: FloatArray
+
+    @classmethod
+    def around(cls, cell: CellFile, start_rad: FloatArray, told: LayoutDoubt) -> NearGuard:
+        """The guard of a cell whose layout is off by no more than is told; raises `InputError`."""
+        joint_speed = float(np.radians(JOINT_SPEED_DEG_S))
+        return cls(enlarged(cell, told), SPEED_M_S, joint_speed, start_rad)
+
+    def with_box(self, box: Box) -> NearGuard:
+        """The same guard, kept out of one box more."""
+        cell = self.cell.model_copy(update={"keep_out": (*self.cell.keep_out, box)})
+        return NearGuard(cell, self.speed_m_s, self.joint_speed_rad_s, self.start_rad)
+
+    def check_start(self) -> None:
+        """Raise `SafetyError` where the arm stands too near to a box to be moved at all."""
+        try:
+            self.check_move(self.start_rad, self.start_rad, "where the arm stands")
+        except SafetyError as refusal:
+            raise SafetyError(
+                f"{refusal} The boxes are taken larger by what the layout may be off; drive the"
+                " arm away from them by hand, or tell a better known layout."
+            ) from None
+
+    def check_move(self, start_rad: FloatArray, end_rad: FloatArray, where: str) -> None:
+        """Raise `SafetyError` where boxes, limits or the neighbourhood refuse the move."""
+        super().check_move(start_rad, end_rad, where)
+        path = self.path(start_rad, end_rad)
+        if (np.abs(path - self.start_rad) > TRAVEL_RAD + 1e-6).any():
+            raise SafetyError(f"{where}: a joint would turn too far from where the arm stood")
+        poses = self.kinematics.forward(np.vstack([self.start_rad, path]))
+        away = rigid.inverse(poses[:1]) @ poses[1:]
+        moved_m = float(np.linalg.norm(away[:, :3, 3], axis=1).max())
+        turned_rad = float(Rotation.from_matrix(away[:, :3, :3]).magnitude().max())
+        if moved_m > FARTHEST_M + 1e-6 or turned_rad > FARTHEST_RAD + 1e-6:
+            raise SafetyError(
+                f"{where}: the flange would go {1e3 * moved_m:.0f} mm and"
+                f" {np.degrees(turned_rad):.0f}° from where it stood; a bootstrap stays within"
+                f" {1e3 * FARTHEST_M:.0f} mm and {np.degrees(FARTHEST_RAD):.0f}°"
+            )
+
+
+def enlarged(cell: CellFile, told: LayoutDoubt) -> CellFile:
+    """The cell with its boxes moved in by as much as the carried thing may be off.
+
+    Raises
+    ------
+    InputError
+        Nothing is left of the workspace.
+    """
+    carried = outline_m(cell.board.board()) if cell.mount == "eye_to_hand" else np.zeros((1, 3))
+    reach_m = float(np.linalg.norm(carried, axis=1).max())
+    margin_m = told.mount_m + reach_m * 2.0 * float(np.sin(0.5 * told.mount_rad))
+    if cell.layout is None:  # what is at the flange may point anywhere
+        margin_m = told.reach_m + reach_m
+    try:
+        space = None if cell.workspace is None else _grown(cell.workspace, -margin_m)
+    except ValidationError:
+        raise InputError(
+            f"cell {cell.name}: workspace: nothing is left of it when it is made"
+            f" {1e3 * margin_m:.0f} mm smaller all round, as the layout's uncertainty demands"
+        ) from None
+    keep_out = tuple(_grown(box, margin_m) for box in cell.keep_out)
+    return cell.model_copy(update={"workspace": space, "keep_out": keep_out})
+
+
+def _grown(box: Box, by_m: float) -> Box:
+    low, high = np.array(box.low_m) - by_m, np.array(box.high_m) + by_m
+    return Box(name=box.name, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()))

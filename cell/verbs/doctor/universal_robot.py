@@ -1,0 +1,117 @@
+"""Whether a Universal Robots arm would let itself be driven; only questions are asked."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from cell.storage.files.cell_file import UniversalRobot
+from cell.verbs.doctor.finding import Finding
+from cell.verbs.doctor.ports import CHECK_LINE, port
+from drivers.errors import DeviceError, DeviceUnreachable
+from drivers.ur.dashboard import Dashboard
+from drivers.ur.reader import Packet, RtdeReader
+
+_PORTS = {29999: "dashboard", 30003: "script", 30004: "RTDE"}
+_LISTEN_S = 1.0
+_SILENCE_S = 1.0  # nothing moves here, so a busy computer may miss a few packets
+_LONGEST_TOOL_M = 1.0
+_CLOCK_SLIP_S = 0.02
+
+
+def universal_robot(robot: UniversalRobot) -> list[Finding]:
+    """Ports, remote control, safety, power, TCP and clock."""
+    ports = [port(f"UR {name}", robot.address, number) for number, name in _PORTS.items()]
+    dashboard, _, rtde = ports
+    findings = [*ports, *(_state(robot.address) if dashboard.ready else [])]
+    return findings + (_packets(robot.address) if rtde.ready else [])
+
+
+def _state(address: str) -> list[Finding]:
+    dashboard = Dashboard(address)
+    try:
+        remote = dashboard.ask("is in remote control")
+        safety = dashboard.ask("safetystatus")
+        mode = dashboard.ask("robotmode")
+    except DeviceUnreachable as silent:
+        return [Finding("UR dashboard", False, str(silent), CHECK_LINE)]
+    finally:
+        dashboard.close()
+    return [
+        Finding(
+            "UR remote control",
+            "false" not in remote.lower(),
+            remote,
+            "switch the pendant from Local to Remote",
+        ),
+        Finding(
+            "UR safety",
+            "NORMAL" in safety or "REDUCED" in safety,
+            safety,
+            "look why it stopped, then release it at the pendant",
+        ),
+        Finding(
+            "UR mode",
+            "RUNNING" in mode,
+            mode,
+            "power on and release the brakes at the pendant",
+        ),
+    ]
+
+
+def _packets(address: str) -> list[Finding]:
+    reader = RtdeReader(address, silence_s=_SILENCE_S)
+    try:
+        reader.connect()
+        heard = _listen(reader)
+    except DeviceError as fault:
+        return [Finding("UR state", False, str(fault), CHECK_LINE)]
+    finally:
+        reader.close()
+    return [_tool(heard[-1]), _clock(heard)]
+
+
+def _listen(reader: RtdeReader) -> list[Packet]:
+    heard = [reader.newest()]
+    while heard[-1].host_t_s - heard[0].host_t_s < _LISTEN_S:
+        time.sleep(0.004)
+        packet = reader.newest()
+        if packet is not heard[-1]:
+            heard.append(packet)
+    return heard
+
+
+def _tool(packet: Packet) -> Finding:
+    offset = np.array(packet.vector("tcp_offset"))
+    length_m = float(np.linalg.norm(offset[:3]))
+    if not offset.any():
+        return Finding("UR tool centre point", True, "none set: poses are the flange's")
+    x, y, z = 1e3 * offset[:3]
+    return Finding(
+        "UR tool centre point",
+        bool(length_m <= _LONGEST_TOOL_M),
+        f"{x:.1f} {y:.1f} {z:.1f} mm from the flange; it is taken out of every pose",
+        "a tool longer than a metre is a slip of units: correct it at the pendant, Installation,"
+        " TCP",
+    )
+
+
+def _clock(heard: list[Packet]) -> Finding:
+    """How far the two clocks run apart while listening; what they are set to does not matter.
+
+    Poses are paired with frames by this computer's clock at a packet's arrival, so what counts is
+    how late packets come: the spread of arrival less the controller's own time.
+    """
+    host = np.array([packet.host_t_s for packet in heard])
+    offset_s = host - np.array([packet.number("timestamp") for packet in heard])
+    slip_s = float(np.percentile(offset_s, 95) - offset_s.min())
+    return Finding(
+        "UR clock",
+        slip_s <= _CLOCK_SLIP_S,
+        f"{offset_s.min():+.3f} s from this computer's, packets up to {1e3 * slip_s:.1f} ms late"
+        f" in {host[-1] - host[0]:.1f} s",
+        "take the load off this computer, or give robot and camera a network of their own; poses"
+        " are told late, which a run with `capture: moving` cannot bear",
+        needed=False,
+    )

@@ -1,0 +1,31 @@
+"""Kalibr: a camchain with one camera, pinhole with radial-tangential distortion."""
+
+from __future__ import annotations
+
+from cell.verbs.export.camera import Camera
+
+
+def text(camera: Camera) -> str:
+    """A `camchain.yaml`: intrinsics fu, fv, pu, pv, and k1, k2, r1, r2.
+
+    Kalibr's radtan has four coefficients: a third radial term is refused, not dropped. Pixel
+    coordinates are OpenCV's.
+    """
+    d = camera.coefficients((4,), "kalibr")
+    width, height = camera.size_px("kalibr")
+    intrinsics = (camera.alpha_px, camera.beta_px, camera.u0_px, camera.v0_px)
+    return (
+        f"# {camera.about}\n"
+        "cam0:\n"
+        "  cam_overlaps: []\n"
+        "  camera_model: pinhole\n"
+        f"  distortion_coeffs: {_list(d)}\n"
+        "  distortion_model: radtan\n"
+        f"  intrinsics: {_list(intrinsics)}\n"
+        f"  resolution: [{width}, {height}]\n"
+        "  rostopic: /camera/image_raw\n"
+    )
+
+
+def _list(values: tuple[float, ...]) -> str:
+    return "[" + ", ".join(repr(float(value)) for value in values) + "]"

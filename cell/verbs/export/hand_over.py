@@ -1,0 +1,127 @@
+"""`cell export`: from a calibration to the text of a file for another program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from cell.errors import InputError
+from cell.storage.files.calibration_source import CalibrationSource, SolutionSource
+from cell.verbs.export.camera import Camera
+from cell.verbs.export.focal_length import focal_lengths_px, moving_law, refusal
+from cell.verbs.export.formats import colmap, kalibr, mrcal, opencv, ros
+from cell.verbs.export.formats.json_text import json_text
+
+_SKEW_PX = 1e-9
+
+TEXTS: dict[str, Callable[[Camera], str]] = {
+    "ros": ros.text,
+    "opencv": opencv.text,
+    "mrcal": mrcal.text,
+    "kalibr": kalibr.text,
+    "colmap": colmap.text,
+}
+FORMATS = (*TEXTS, "json")
+
+
+@dataclass(frozen=True)
+class Exported:
+    """The text of the file, and what its reader should know besides."""
+
+    text: str
+    warnings: tuple[str, ...]
+
+
+def export_calibration(
+    calibration: CalibrationSource,
+    tool: str,
+    *,
+    distance_m: float | None = None,
+    solution: str | None = None,
+    image_size_px: tuple[int, int] | None = None,
+) -> Exported:
+    """The calibrated camera in a tool's own format.
+
+    Parameters
+    ----------
+    calibration:
+        From `read_calibration`.
+    tool:
+        One of `FORMATS`.
+    distance_m:
+        Where a focal length that moves is taken; `json` alone can do without.
+    solution:
+        Name of the solution; the recommended one where None.
+    image_size_px:
+        (width, height) for a file that does not tell.
+
+    Raises
+    ------
+    InputError
+        The format cannot say this camera; the message tells what to choose.
+    """
+    name = calibration.recommended() if solution is None else solution
+    found, law = calibration.solution(name), moving_law(calibration, name)
+    if tool not in FORMATS:
+        raise InputError(f"--format {tool}: is not known; known are {', '.join(FORMATS)}")
+    if distance_m is not None and not distance_m > 0:
+        raise InputError(f"--distance {distance_m:g}: must be a positive number of metres")
+    warnings = _warnings(calibration, name, distance_m)
+    if tool == "json":
+        return Exported(json_text(calibration, name, distance_m), warnings)
+    if law is not None and distance_m is None:
+        raise InputError(refusal(calibration, name, tool))
+    _refuse_skew(found, name, tool)
+    size = calibration.image_size_px or image_size_px
+    return Exported(TEXTS[tool](_camera(calibration, name, size, distance_m)), warnings)
+
+
+def _camera(
+    calibration: CalibrationSource,
+    name: str,
+    image_size_px: tuple[int, int] | None,
+    distance_m: float | None,
+) -> Camera:
+    found = calibration.solution(name)
+    alpha, beta = found.alpha_px, found.beta_px
+    at = "at every distance"
+    if distance_m is not None and moving_law(calibration, name) is not None:
+        alpha, beta = focal_lengths_px(calibration, name, distance_m)
+        at = f"at {distance_m:g} m only, its focal length moves"
+    recording = " ".join(calibration.recording.split())
+    return Camera(
+        image_size_px=image_size_px,
+        alpha_px=alpha,
+        beta_px=beta,
+        u0_px=found.u0_px,
+        v0_px=found.v0_px,
+        distortion=found.distortion,
+        about=f"calibration of recording {recording}, solution {name}; holds {at}",
+    )
+
+
+def _refuse_skew(found: SolutionSource, name: str, tool: str) -> None:
+    if abs(found.skew_px) > _SKEW_PX:
+        raise InputError(
+            f"solution {name} has a skew of {found.skew_px:.4g} px, which {tool} cannot say."
+            " Choose one without, such as --solution joint_ml or zhang_mle_no_skew,"
+            " or --format json"
+        )
+
+
+def _warnings(
+    calibration: CalibrationSource, name: str, distance_m: float | None
+) -> tuple[str, ...]:
+    told: list[str] = []
+    law, span = calibration.focus_law, calibration.range_m
+    if law is not None and law.moves and moving_law(calibration, name) is None:
+        told.append(
+            f"solution {name} has one focal length for all distances, but it follows the distance"
+            f" by {law.law}: this camera is wrong nearly everywhere"
+        )
+    if distance_m is not None and span is not None and not span[0] <= distance_m <= span[1]:
+        told.append(
+            f"--distance {distance_m:g} lies outside the calibrated range, {span[0]:.3f} to"
+            f" {span[1]:.3f} m: the focal length there is an extrapolation"
+        )
+    return tuple(told)

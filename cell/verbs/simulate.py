@@ -1,0 +1,146 @@
+"""`cell simulate`: recordings made by the simulated cell, corners only or with pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from calib.views import Views
+from cell.devices.factory import simulated_devices
+from cell.devices.log_mixups import SLIPS, slip
+from cell.devices.simulated_cell import home_of, log_of, present_effect, simulated_cell
+from cell.errors import BadAnswer, InputError
+from cell.sequencer.session import header_of, record_plan
+from cell.storage.files.cell_file import EffectFile, Simulation
+from cell.storage.files.plan_file import Plan
+from cell.storage.recording import Corners, FrameRecord, PoseRecord, RecordingWriter, write_corners
+from cell.storage.recording.corners import FILE_NAME as DETECTIONS
+from cell.storage.recording.header import Capture
+from sim.cell import SimulatedCell
+from sim.synthesize import synthesize
+
+_SLIP_STREAM = 101
+_COLUMNS = (
+    "t_s",
+    "joints_rad",
+    "joint_velocity_rad_s",
+    "approach_joints_rad",
+    "temperature_c",
+    "focus_position",
+    "focus_distance_m",
+    "exposure_s",
+)
+
+
+def simulate_corners(plan: Plan, folder: Path, seed: int | None = None) -> int:
+    """Write the recording that the plan's simulated cell would make; returns its frame count.
+
+    Raises
+    ------
+    InputError
+        The cell has no truth to simulate, or a recording is in the way.
+    """
+    views = simulated_views(plan, simulated_cell(plan.cell, home_of(plan), seed=seed))
+    header = header_of(plan, simulated=True, images=False)
+    header = header.model_copy(
+        update={"robot": header.robot.model_copy(update={"model": views.robot_model})}
+    )
+    if views.moving:
+        header = header.model_copy(update={"capture": Capture(mode="moving")})
+    corners = Corners(dict(zip(views.frame.tolist(), views.corners_px, strict=True)))
+    with RecordingWriter.create(folder, header) as writer:
+        for index, view in enumerate(plan.file.views):
+            writer.append(_record(views, index, {"view": view.name, "station": view.station}))
+    write_corners(folder / DETECTIONS, corners, views.board)
+    return len(views)
+
+
+def simulate_pictures(plan: Plan, folder: Path, seed: int | None = None) -> int:
+    """Run the plan on the simulated arm and camera; returns the number of frames it logged.
+
+    Raises
+    ------
+    BadAnswer
+        The run did not get through the plan.
+    """
+    result = record_plan(plan, folder, simulated_devices(plan, seed=seed), simulated=True)
+    if result.reason:
+        raise BadAnswer(f"{folder}: {result.finish.words}: {result.reason}")
+    return result.frames
+
+
+def simulated_views(plan: Plan, cell: SimulatedCell) -> Views:
+    """What the plan's simulated cell would record, without a file; raises `InputError`."""
+    views = synthesize(cell, log_of(plan, cell))
+    effects = plan.cell.simulation.effects if plan.cell.simulation else ()
+    rng = cell.random(_SLIP_STREAM)
+    for effect in effects:
+        if effect.name in SLIPS:
+            views = slip(views, effect, rng)
+    return views
+
+
+def _record(views: Views, index: int, more: Mapping[str, Any]) -> FrameRecord:
+    values: dict[str, Any] = {"frame": int(views.frame[index]), "image": None}
+    values |= {name: _logged(getattr(views, name)[index]) for name in _COLUMNS}
+    if views.has_pose[index]:
+        pose = RigidTransform.from_matrix(views.base_from_flange[index])
+        values["base_from_flange"] = PoseRecord.of(pose)
+    values |= {name: value for name, value in more.items() if value is not None}
+    return FrameRecord.model_validate(values)
+
+
+def _logged(value: np.ndarray[Any, Any] | np.float64) -> Any:
+    return np.asarray(value).tolist() if np.isfinite(value).all() else None
+
+
+def with_effects(plan: Plan, effects: tuple[str, ...]) -> Plan:
+    """The plan with these effects (``NAME:key=value,...``) in place of its cell's own.
+
+    Raises
+    ------
+    InputError
+        An effect, a law or a parameter is unknown, or a value is no number.
+    """
+    truth = plan.cell.simulation
+    if not effects or truth is None:
+        return plan
+    parsed = tuple(parse_effect(text) for text in effects)
+    for effect in parsed:
+        if effect.name not in SLIPS:
+            present_effect(effect, "--effect")
+    return with_truth(plan, truth.model_copy(update={"effects": parsed}))
+
+
+def with_truth(plan: Plan, truth: Simulation) -> Plan:
+    """The plan with another truth in its cell."""
+    return replace(plan, cell=plan.cell.model_copy(update={"simulation": truth}))
+
+
+def parse_effect(text: str) -> EffectFile:
+    """Read ``NAME:key=value,...``; several values of one key are parted by ``/``."""
+    name, _, rest = text.partition(":")
+    law: str | None = None
+    parameters: dict[str, float | tuple[float, ...]] = {}
+    for pair in filter(None, rest.split(",")):
+        key, equals, value = pair.partition("=")
+        if not equals:
+            raise InputError(f"--effect {text}: `{pair}` is no key=value")
+        if key == "law":
+            law = value
+        else:
+            parameters[key] = _numbers(text, pair, value)
+    return EffectFile(name=name, law=law, parameters=parameters)
+
+
+def _numbers(text: str, pair: str, value: str) -> float | tuple[float, ...]:
+    try:
+        numbers = tuple(float(part) for part in value.split("/"))
+    except ValueError:
+        raise InputError(f"--effect {text}: the value of `{pair}` is no number") from None
+    return numbers if len(numbers) > 1 else numbers[0]

@@ -1,0 +1,1 @@
+"""`cell verify`: an old calibration checked against the camera as it is now."""

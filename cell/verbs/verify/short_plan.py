@@ -1,0 +1,103 @@
+"""The few views of a plan that would show best whether the camera changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.chain.model import predict
+from calib.solver.pose_information import pose_information
+from calib.views import BoolArray, Views
+from cell.devices.simulated_cell import home_of
+from cell.errors import InputError
+from cell.sequencer.guard import Guard
+from cell.storage.files.plan_file import Plan
+from cell.verbs.verify.change import wide
+from cell.verbs.verify.judge import FRAMES_NEEDED
+from cell.verbs.verify.old_cell import OldCell
+
+SHORT = 8
+_MARGIN = 0.03
+"""Share of the image at its edge that a board moved a little would leave."""
+
+
+def shortened(old: OldCell, plan: Plan, count: int) -> Plan:
+    """The plan with its most telling views alone.
+
+    Raises
+    ------
+    InputError
+        Too few views are asked for, or show the board to the old calibration.
+    """
+    if count < FRAMES_NEEDED:
+        raise InputError(f"--views {count}: at least {FRAMES_NEEDED} are needed")
+    views = plan.file.views
+    if count < len(views):
+        views = tuple(views[k] for k in choose_views(old, _log(old, plan), count))
+    # a run that ended early would lack the views that tell
+    return replace(plan, file=plan.file.model_copy(update={"views": views, "until": None}))
+
+
+def choose_views(old: OldCell, log: Views, count: int) -> NDArray[np.int64]:
+    """(count,) places of the views that leave least open what changed, in the plan's order.
+
+    One view after the other is taken that lowers the volume of the uncertainty of a change of
+    mount, lens and board most (D-optimal, greedy; Fedorov 1972).
+
+    Parameters
+    ----------
+    old:
+        The calibration to check.
+    log:
+        What a run of the plan would log, all frames with poses; corners are not looked at.
+    count:
+        How many to take.
+
+    Raises
+    ------
+    InputError
+        Fewer views show the whole board to the old calibration.
+    """
+    possible = np.flatnonzero(_whole(old, log))
+    if len(possible) < count:
+        raise InputError(
+            f"only {len(possible)} of the plan's {len(log)} views show the whole board by the old"
+            f" calibration, {count} are asked for: was it made with this cell and plan?"
+        )
+    told = pose_information(old.model, log.take(possible), (), old.noise)
+    gathered = np.diag([wide(old.model, unknown) ** -2.0 for unknown in told.unknowns])
+    chosen: list[int] = []
+    for _ in range(count):
+        gain = np.array([np.linalg.slogdet(gathered + one)[1] for one in told.frames])
+        gain[chosen] = -np.inf
+        chosen.append(int(gain.argmax()))
+        gathered = gathered + told.frames[chosen[-1]]
+    return np.sort(possible[chosen])
+
+
+def _whole(old: OldCell, log: Views) -> BoolArray:
+    """(N,) which views show the board, away from the image's edge."""
+    pixels = predict(old.model, log)
+    size = np.array([log.width_px, log.height_px])
+    low, high = pixels > _MARGIN * size, pixels < (1 - _MARGIN) * size
+    inside: BoolArray = np.asarray((low & high).all(axis=2))
+    return np.asarray(inside.all(axis=1) if log.board.kind == "chessboard" else inside.any(axis=1))
+
+
+def _log(old: OldCell, plan: Plan) -> Views:
+    """Where the flange will be in each view, by the arm's nominal kinematics."""
+    guard, here, poses = Guard.of(plan), home_of(plan), []
+    for index, view in enumerate(plan.file.views):
+        if view.joints() is None and view.base_from_flange is not None:
+            poses.append(view.base_from_flange.transform().as_matrix())
+            continue
+        here = guard.joints_of(plan, index, here)
+        poses.append(guard.kinematics.forward(here))
+    width, height = old.image_size_px
+    blank = Views.blank(
+        plan.cell.board.board(), width_px=width, height_px=height, frames=len(poses),
+        mount=old.mount,
+    )  # fmt: skip
+    return replace(blank, base_from_flange=np.array(poses))

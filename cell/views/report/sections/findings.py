@@ -1,0 +1,182 @@
+"""The diagnosis as a story: where it hurts, what it is, how sure, what it costs, what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cell.views.report import html
+from cell.views.report.data import ReportData
+from cell.views.report.evidence import picture_of, remedy_of
+from cell.views.report.figures import proof
+from cell.views.report.numbers import (
+    UNKNOWN,
+    known,
+    millimetres,
+    number,
+    parameters,
+    probability,
+)
+from cell.views.report.sections.answer import verdict_words
+from cell.views.report.sections.drawing import drawing
+
+
+def story(data: ReportData) -> str:
+    """The whole diagnosis, or that there was none."""
+    if data.diagnosis is None:
+        words = "No diagnosis was made: “cell diagnose” makes one from this recording."
+        return html.section("diagnosis", "Diagnosis", html.missing(words))
+    verdict, meaning, _ = verdict_words(data)
+    return html.section(
+        "diagnosis",
+        f"Diagnosis: {verdict.lower()}",
+        html.paragraph(f"{meaning[0].upper()}{meaning[1:]}.", "lead"),
+        _where(data),
+        *(_effect(data, effect) for effect in data.diagnosis.get("effects") or []),
+        _unexplained(data.diagnosis),
+        _rivals(data.diagnosis),
+        _holdout(data),
+        _notes(data.diagnosis.get("notes") or []),
+    )
+
+
+def _notes(notes: list[str]) -> str:
+    if not notes:
+        return ""
+    title = "What was worked out, and what could not be seen"
+    return f"<h3>{title}</h3>{html.bullets(note.replace('_', ' ') for note in notes)}"
+
+
+def _where(data: ReportData) -> str:
+    rows = (data.diagnosis or {}).get("mismatch") or []
+    if not rows:
+        return html.paragraph("No link of the chain shows a misfit beyond noise.")
+    table = html.table(
+        ("link", "site", "along", "where", "share of excess", "p"),
+        [
+            (m["link"], m.get("site") or "", m["covariate"], m.get("where") or "everywhere",
+             _share(m["share_of_excess"]), probability(m.get("p_value")))
+            for m in rows
+        ],
+    )  # fmt: skip
+    shown = drawing(
+        lambda: proof.draw_mismatch(data),
+        "Where the misfit beyond noise lives: link of the chain, what it follows, in which range. "
+        "Shares overlap where two quantities changed together during the run.",
+        "The shares of the misfit were not measured.",
+    )
+    return f"<h3>Where it hurts</h3>{shown}{html.fold('All places, with p-values', table)}"
+
+
+def _effect(data: ReportData, effect: Mapping[str, Any]) -> str:
+    name = str(effect["name"]).replace("_", " ")
+    law = f" ({str(effect['law']).replace('_', ' ')})" if effect.get("law") else ""
+    remedy = remedy_of(effect) or "No remedy is on file for this effect."
+    facts = html.table(
+        ("question", "answer"),
+        [
+            ("What it is", effect.get("physics") or "not described"),
+            ("How large", parameters(effect.get("parameters") or {}) or "no parameters"),
+            ("How sure", _sureness(effect)),
+            ("What it costs", _cost(data, effect)),
+            ("What to do", remedy),
+        ],
+    )  # fmt: skip
+    return (
+        f'<article class="effect"><h3>{html.text(effect.get("link"))}: {html.text(name + law)}</h3>'
+        f'<div class="facts">{facts}</div>{_picture(data, effect)}</article>'
+    )
+
+
+def _sureness(effect: Mapping[str, Any]) -> str:
+    gain = effect.get("holdout_gain_px")
+    held = f"; held-out frames improve by {number(gain, 'px', 2)}" if gain else ""
+    return f"p {probability(effect.get('p_value'))}{held}"
+
+
+def _picture(data: ReportData, effect: Mapping[str, Any]) -> str:
+    picture = picture_of(effect)
+    if picture is None:
+        return html.missing("No drawing is registered for this effect.")
+    name = str(effect["name"]).replace("_", " ")
+    return drawing(
+        lambda: picture.draw(data, effect),
+        f"{name}. {picture.look_for}",
+        f"Not drawn: it needs {picture.needs}.",
+    )
+
+
+def _cost(data: ReportData, effect: Mapping[str, Any]) -> str:
+    """What leaving this effect out costs at the tool, or else all that was found together."""
+    found = data.evidence
+    if found is None or found.shift_before_m is None:
+        return "in mm not known: no per-frame pose errors were measured"
+    alone = found.cost_m.get(effect["name"])
+    if alone is None:
+        without = f"the camera is {millimetres(_rms(found.shift_before_m))} RMS off without it"
+    else:
+        without = (
+            f"left out alone, and hand-eye solved again: the camera {millimetres(alone)} RMS off"
+        )
+    if found.shift_after_m is None:
+        return without
+    return f"{without}; {millimetres(_rms(found.shift_after_m))} with all that was found"
+
+
+def _unexplained(diagnosis: Mapping[str, Any]) -> str:
+    left = diagnosis.get("unexplained")
+    if not left:
+        return ""
+    place = f", {left['where']}" if left.get("where") else ""
+    words = (
+        f"Something real is left in the {left['link']}, along {left['covariate']}{place} "
+        f"(p {probability(left.get('p_value'))}). "
+        "No known effect accounts for it; look there."
+    )
+    return f"<h3>What nobody can name</h3>{html.paragraph(words, 'bad-note')}"
+
+
+def _rivals(diagnosis: Mapping[str, Any]) -> str:
+    rows = diagnosis.get("ambiguous_with") or []
+    if not rows:
+        return "<h3>What else it could be</h3>" + html.paragraph(
+            "No other known effect explains the recording as well."
+        )
+    table = html.table(
+        ("could also be", "because", "what would tell them apart"),
+        [
+            (", ".join(n.replace("_", " ") for n in row["names"]), row.get("why") or "",
+             _separation(row))
+            for row in rows
+        ],
+    )  # fmt: skip
+    return f"<h3>What else it could be</h3>{table}"
+
+
+def _separation(row: Mapping[str, Any]) -> str:
+    if row.get("separate_with"):
+        return f"cell run {row['separate_with']}"
+    return str(row.get("experiment") or "no pose plan can")
+
+
+def _holdout(data: ReportData) -> str:
+    holdout = (data.diagnosis or {}).get("holdout") or {}
+    frames = holdout.get("frames")
+    count = len(frames) if isinstance(frames, list | tuple) else frames
+    shown = drawing(
+        lambda: proof.draw_holdout(data),
+        f"The proof: {count} frames that took no part in any fit, before (plain model) and after "
+        "(with what was found); the dotted line is what noise alone would leave.",
+        "No frames were held out, so there is no proof beyond the fit itself.",
+    )
+    return f"<h3>Does it hold on frames nobody fitted?</h3>{shown}"
+
+
+def _rms(shift_m: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean((shift_m**2).sum(axis=1))))
+
+
+def _share(value: float | None) -> str:
+    return f"{100 * value:.0f} %" if known(value) else UNKNOWN
