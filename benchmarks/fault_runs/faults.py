@@ -160,7 +160,7 @@ def _local(stand: Stand, _: Launch) -> None:
 
 
 def _mute(stand: Stand, _: Launch) -> None:
-    stand.arm.mute = True
+    stand.arm.faults.mute = True
 
 
 _UR_CHILD = "ur/child.py"
@@ -309,12 +309,8 @@ _GIGE = (
 
 
 def _refuse_stop(stand: Stand, launch: Launch) -> None:
-    stand.arm.faults.stop_refused = True
+    stand.arm.faults.rapid_stop_refused = True
     launch.send(signal.SIGINT)
-
-
-def _mute_abb(stand: Stand, _: Launch) -> None:
-    stand.arm.faults.mute = True
 
 
 _ABB = (
@@ -341,7 +337,7 @@ _ABB = (
     ),
     Fault(
         "cable cut",
-        _mute_abb,
+        lambda stand, _: stand.arm.cut(),
         exits=(_DEVICE, _SAFETY),
         words=("emergency stop|EMERGENCY STOP|[Cc]heck", RESUMES),
         halt_s=1.5,

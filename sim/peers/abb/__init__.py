@@ -1,5 +1,5 @@
 """An ABB IRC5 controller on loopback."""
 
-from sim.peers.abb.controller import ABBController, Event
+from sim.peers.abb.controller import ABBController
 
-__all__ = ["ABBController", "Event"]
+__all__ = ["ABBController"]

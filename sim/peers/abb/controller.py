@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from scipy.spatial.transform import RigidTransform
 
@@ -15,34 +15,13 @@ from sim.peers.abb.egm import EgmSender
 from sim.peers.abb.event_log import EventLog
 from sim.peers.abb.http_server import RwsServer
 from sim.peers.abb.motion_program import BadProgram, Wait, decode
+from sim.peers.abb.panel import ABBFaults, PanelState
+from sim.peers.controller_faults import Reported, StopOrders
+from sim.peers.events import Event
 
 RAMDISK = "RAMDISK"
 PROGRAM_FILE = f"{RAMDISK}/motion_program.bin"
 _POLL_S = 0.004
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that reached the controller, on the host's monotonic clock."""
-
-    t_s: float
-    what: str
-
-
-@dataclass
-class PanelState:
-    """``controller`` is RWS's ctrlstate, ``mode`` its opmode."""
-
-    controller: str = "motoron"
-    mode: str = "AUTO"
-
-
-@dataclass
-class ABBFaults:
-    """``mute``: requests are read and never answered; ``stop_refused``: 403 to every stop."""
-
-    mute: bool = False
-    stop_refused: bool = False
 
 
 class ABBController:
@@ -61,6 +40,12 @@ class ABBController:
 
     Attributes
     ----------
+    faults:
+        What goes wrong with it, on command.
+    reported:
+        The arm's state as the controller reports it.
+    stop_orders:
+        How orders to stop are taken.
     world_from_base:
         Where the arm is mounted; work objects and EGM refer to the world.
     flange_from_active_tool:
@@ -79,6 +64,8 @@ class ABBController:
         self.port = port
         self.panel = PanelState()
         self.faults = ABBFaults()
+        self.reported = Reported(arm.state, lambda: self.faults)
+        self.stop_orders = StopOrders(lambda: self.faults, self.halt, self.note)
         self.files: dict[str, bytes] = {}
         self.log = EventLog()
         self.events: list[Event] = []
@@ -86,7 +73,7 @@ class ABBController:
         self.running = False
         self.world_from_base = RigidTransform.identity()
         self.flange_from_active_tool = RigidTransform.identity()
-        self.watch = CellWatch(self.stop)
+        self.watch = CellWatch(self._stop_for_silence)
         self._egm = EgmSender(self, (address, egm_port)) if egm_port else None
         self._stop_rapid = threading.Event()
         self._program: threading.Thread | None = None
@@ -94,7 +81,7 @@ class ABBController:
 
     def __enter__(self) -> ABBController:
         self.arm.connect()
-        self._http = RwsServer(self)
+        self._http = RwsServer((self.address, self.port), self)
         self.watch.start()
         if self._egm is not None:
             self._egm.start()
@@ -125,16 +112,20 @@ class ABBController:
 
     def kill(self) -> None:
         """The controller dies: ports closed, brakes on."""
-        self.faults.mute = False
+        self.faults.mend_cable()
         self._http.close()
         self.watch.close()
         if self._egm is not None:
             self._egm.close()
-        self.stop("controller killed")
+        self.halt("controller killed")
 
     def drop(self) -> None:
         """Close every connection and keep accepting."""
         self._http.drop()
+
+    def cut(self) -> None:
+        """Pull the network cable."""
+        self.faults.cut()
 
     def restore(self) -> None:
         """Cable in, guard closed, button released, key to automatic, motors on."""
@@ -143,7 +134,7 @@ class ABBController:
 
     def _safety_stop(self, state: str) -> None:
         self.panel.controller = state
-        self.stop(state)
+        self.halt(state)
 
     # ---- what its ports order ----------------------------------------------------------------
 
@@ -160,7 +151,11 @@ class ABBController:
             self._program.start()
 
     def stop(self, why: str) -> None:
-        """Stop RAPID and the arm."""
+        """Stop RAPID and the arm, as far as the faults let it."""
+        self.stop_orders.take(why)
+
+    def halt(self, why: str) -> None:
+        """Stop RAPID and the arm, whatever the faults say."""
         with self._lock:
             self._stop_rapid.set()
             if self.arm.state().motion is Motion.MOVING:
@@ -169,6 +164,10 @@ class ABBController:
             program = self._program
         if program is not None:
             program.join(timeout=1.0)
+
+    def _stop_for_silence(self, why: str) -> None:
+        if not self.faults.watchdog_fails:
+            self.stop(why)
 
     def _run(self) -> None:
         name = f"log-{time.time_ns()}.bin".replace("_", "-")

@@ -8,24 +8,39 @@ from __future__ import annotations
 import contextlib
 import socket
 import threading
-import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from ABBRobotEGM._egm_protobuf import egm_pb2
+from scipy.spatial.transform import RigidTransform
 
 from drivers.abb.units import millimetres, scalar_first
-
-if TYPE_CHECKING:
-    from sim.peers.abb.controller import ABBController
+from drivers.arm import ArmState
+from sim.peers.controller_faults import ControllerFaults
 
 _PERIOD_S = 0.008
+
+
+class Controller(Protocol):
+    """What the stream tells of its controller."""
+
+    running: bool
+    world_from_base: RigidTransform
+
+    @property
+    def faults(self) -> ControllerFaults:
+        """What goes wrong with it."""
+
+    @property
+    def reported(self) -> Callable[[], ArmState]:
+        """Returns the arm's state as the controller reports it."""
 
 
 class EgmSender:
     """Sends one message a period to one address."""
 
-    def __init__(self, controller: ABBController, target: tuple[str, int]) -> None:
+    def __init__(self, controller: Controller, target: tuple[str, int]) -> None:
         self._controller = controller
         self._target = target
         self._closing = threading.Event()
@@ -50,11 +65,11 @@ class EgmSender:
                         link.sendto(self._message(), self._target)
 
     def _message(self) -> bytes:
-        state = self._controller.arm.state()
+        state = self._controller.reported()
         message = egm_pb2.EgmRobot()
         self._number += 1
         message.header.seqno = self._number
-        message.header.tm = int(time.monotonic() * 1000) % 2**32
+        message.header.tm = int((state.controller_t_s or 0.0) * 1000) % 2**32
         message.header.mtype = egm_pb2.EgmHeader.MSGTYPE_DATA
         joints = np.degrees(state.joints_rad or ())
         message.feedBack.joints.joints.extend(joints.tolist())

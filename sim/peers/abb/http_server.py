@@ -7,26 +7,24 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from http.server import BaseHTTPRequestHandler
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from sim.peers.abb.digest import DigestLogin
-from sim.peers.abb.resources import Answer, Resources, error
+from sim.peers.abb.resources import Answer, Controller, Resources, error
 from sim.peers.http import DroppableServer
 
-if TYPE_CHECKING:
-    from sim.peers.abb.controller import ABBController
-
-_MUTE_POLL_S = 0.02
+_POLL_S = 0.02
 
 
 class RwsServer:
     """Serves RWS clients of one controller."""
 
-    def __init__(self, controller: ABBController) -> None:
+    def __init__(self, address: tuple[str, int], controller: Controller) -> None:
         handler = type("Handler", (_Handler,), {"resources": Resources(controller)})
-        self._server = DroppableServer((controller.address, controller.port), handler)
+        self._server = DroppableServer(address, handler)
         self._thread = threading.Thread(
             target=self._server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True
         )
@@ -66,8 +64,9 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _serve(self, method: str) -> None:
         body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
-        while self.resources.mute:
-            threading.Event().wait(_MUTE_POLL_S)
+        faults = self.resources.faults
+        while faults().deaf:
+            time.sleep(_POLL_S)
         if not self._login.accepts(method, self.headers.get("Authorization")):
             self._answer(error(401, -1, "Unauthorized"))
             return
@@ -76,6 +75,8 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(self.resources.answer(method, unquote(url.path).strip("/"), query, body))
 
     def _answer(self, answer: Answer) -> None:
+        while self.resources.faults().mute:
+            time.sleep(_POLL_S)
         content = answer.body
         if not isinstance(content, bytes):
             content = json.dumps(content).encode()

@@ -5,15 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 from urllib.parse import parse_qs
 
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
 from drivers.abb.units import millimetres, scalar_first
-
-if TYPE_CHECKING:
-    from sim.peers.abb.controller import ABBController
+from drivers.arm import ArmState
+from sim.peers.abb.cell_watch import CellWatch
+from sim.peers.abb.event_log import EventLog
+from sim.peers.abb.panel import ABBFaults, PanelState
+from sim.peers.controller_faults import StopOrders
 
 _UNUSED_AXIS = "9E+09"
 _FILES = "fileservice/"
@@ -39,10 +42,44 @@ def error(status: int, code: int, message: str) -> Answer:
     return Answer(status, {"_embedded": {"status": {"code": code, "msg": message}}})
 
 
+_NOT_ALLOWED = error(403, -1073442809, "operation not allowed in this controller state")
+
+
+class Controller(Protocol):
+    """What the resources tell of their controller, and what they order."""
+
+    running: bool
+    panel: PanelState
+    faults: ABBFaults
+    files: dict[str, bytes]
+    log: EventLog
+    watch: CellWatch
+    request_times_s: list[float]
+    world_from_base: RigidTransform
+    flange_from_active_tool: RigidTransform
+
+    @property
+    def stop_orders(self) -> StopOrders:
+        """How orders to stop are taken."""
+
+    @property
+    def reported(self) -> Callable[[], ArmState]:
+        """Returns the arm's state as the controller reports it."""
+
+    def note(self, what: str) -> None:
+        """Remember that something arrived."""
+
+    def start(self) -> None:
+        """Start RAPID at the program pointer."""
+
+    def stop(self, why: str) -> None:
+        """Stop RAPID and the arm."""
+
+
 class Resources:
     """Answers requests for one controller."""
 
-    def __init__(self, controller: ABBController) -> None:
+    def __init__(self, controller: Controller) -> None:
         self._controller = controller
         units = "rw/motionsystem/mechunits/ROB_1"
         self._robtarget_path = f"{units}/robtarget"
@@ -64,10 +101,9 @@ class Resources:
             ("rw/panel/ctrlstate", "setctrlstate"): self._motors_off,
         }
 
-    @property
-    def mute(self) -> bool:
-        """Whether requests are to hang."""
-        return self._controller.faults.mute
+    def faults(self) -> ABBFaults:
+        """What goes wrong with the controller at present."""
+        return self._controller.faults
 
     def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> Answer:
         """Return what a request gets."""
@@ -103,13 +139,13 @@ class Resources:
         )
 
     def _jointtarget(self) -> Answer:
-        joints = np.degrees(self._controller.arm.state().joints_rad or ())
+        joints = np.degrees(self._controller.reported().joints_rad or ())
         entry = {f"rax_{i}": f"{angle:.6f}" for i, angle in enumerate(joints, 1)}
         entry |= {f"eax_{letter}": _UNUSED_AXIS for letter in "abcdef"}
         return state({"_type": "ms-jointtarget", **entry})
 
     def _robtarget(self, query: dict[str, str]) -> Answer:
-        pose = self._controller.arm.state().base_from_flange
+        pose = self._controller.reported().base_from_flange
         if query.get("coordinate") != "Base":
             pose = self._controller.world_from_base * pose
         if query.get("tool") != "tool0":
@@ -124,7 +160,7 @@ class Resources:
         controller = self._controller
         controller.note("rws: start")
         if controller.panel.mode != "AUTO" or controller.panel.controller != "motoron":
-            return error(403, -1073442809, "operation not allowed in this controller state")
+            return _NOT_ALLOWED
         if controller.running:
             return error(403, -1073442812, "RAPID is executing")
         controller.start()
@@ -132,13 +168,15 @@ class Resources:
 
     def _stop(self) -> Answer:
         self._controller.note("rws: stop")
-        if self._controller.faults.stop_refused:
-            return error(403, -1073442809, "operation not allowed in this controller state")
+        if self._controller.stop_orders.refused or self._controller.faults.rapid_stop_refused:
+            return _NOT_ALLOWED
         self._controller.stop("rws stop")
         return Answer(204)
 
     def _motors_off(self) -> Answer:
         self._controller.note("rws: motors off")
+        if self._controller.stop_orders.refused:
+            return _NOT_ALLOWED
         self._controller.panel.controller = "motoroff"
         self._controller.stop("motors off")
         return Answer(204)

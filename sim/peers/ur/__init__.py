@@ -1,5 +1,6 @@
 """A Universal Robots controller on loopback."""
 
-from sim.peers.ur.controller import Event, Robot, Runtime, Safety, URController
+from sim.peers.ur.controller import URController
+from sim.peers.ur.modes import Robot, Runtime, Safety
 
-__all__ = ["Event", "Robot", "Runtime", "Safety", "URController"]
+__all__ = ["Robot", "Runtime", "Safety", "URController"]

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass
-from enum import IntEnum
 
 from calib.chain.kinematics import ArmKinematics
 from drivers.arm import Arm, ArmState, Motion, MoveTarget
 from drivers.errors import DeviceError, SafetyError
 from drivers.ur.pose import base_from_tcp, pose_of
 from drivers.ur.wire import RTDE_PORT, Value
+from sim.peers.controller_faults import Reported, StopOrders
+from sim.peers.events import Event
 from sim.peers.listener import Listener
 from sim.peers.ur.dashboard import DashboardServer
+from sim.peers.ur.faults import URFaults
+from sim.peers.ur.modes import Robot, Runtime, Safety
 from sim.peers.ur.primary import PrimaryServer
 from sim.peers.ur.program import ControlProgram
 from sim.peers.ur.rtde import RtdeServer
@@ -26,38 +28,6 @@ from sim.peers.ur.script import ScriptServer
 
 DASHBOARD_PORT, PRIMARY_PORT, SCRIPT_PORT = 29999, 30001, 30003
 UNLOCK_WAIT_S = 5.0
-
-
-class Runtime(IntEnum):
-    """RTDE's ``runtime_state``."""
-
-    STOPPED = 1
-    PLAYING = 2
-    PAUSED = 4
-
-
-class Robot(IntEnum):
-    """RTDE's ``robot_mode``."""
-
-    POWER_OFF = 3
-    IDLE = 5
-    RUNNING = 7
-
-
-class Safety(IntEnum):
-    """RTDE's ``safety_status_bits``."""
-
-    NORMAL = 1 << 0
-    PROTECTIVE_STOP = 1 << 2
-    EMERGENCY_STOP = (1 << 6) | (1 << 7)
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that reached the controller, on the host's monotonic clock."""
-
-    t_s: float
-    what: str
 
 
 class URController:
@@ -77,12 +47,10 @@ class URController:
 
     Attributes
     ----------
-    reserved_inputs, missing_outputs:
-        RTDE names that a fieldbus holds, or that this version does not know.
-    mute, deaf:
-        Nothing goes out; what comes in is thrown away. No connection is closed.
-    ignore_new_clients:
-        New RTDE connections are accepted and never answered.
+    faults:
+        What goes wrong with it, on command.
+    stop_orders:
+        How orders to stop are taken.
     events:
         What reached the controller, and every halt of the arm.
     """
@@ -102,11 +70,8 @@ class URController:
         self.version = (5, 12, 6, 1102099)
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         self.remote_control = True
-        self.reserved_inputs: frozenset[str] = frozenset()
-        self.missing_outputs: frozenset[str] = frozenset()
-        self.mute = False
-        self.deaf = False
-        self.ignore_new_clients = False
+        self.faults = URFaults()
+        self.stop_orders = StopOrders(lambda: self.faults, self.halt, self.note)
         self.registers: dict[str, int | float] = {}
         self.events: list[Event] = []
         self.robot_mode = Robot.RUNNING
@@ -115,6 +80,7 @@ class URController:
         self._program: ControlProgram | None = None
         self._target: MoveTarget | None = None
         self._protective_stop_s = -UNLOCK_WAIT_S
+        self._reported = Reported(arm.state, lambda: self.faults)
         self._lock = threading.RLock()
         self._stopping = threading.Event()
         self._ports: list[Listener] = []
@@ -156,7 +122,8 @@ class URController:
         with self._lock:
             self.safety = Safety.EMERGENCY_STOP
             self.robot_mode = Robot.POWER_OFF
-            self.stop_program("emergency stop")
+            self._end_program()
+            self.halt("emergency stop")
 
     def drop(self) -> None:
         """Close every connection and keep accepting."""
@@ -165,7 +132,7 @@ class URController:
 
     def cut(self) -> None:
         """Pull the network cable: nothing passes in either direction, no socket is closed."""
-        self.mute = self.deaf = True
+        self.faults.cut()
 
     def kill(self) -> None:
         """The controller dies: ports closed, brakes fall in."""
@@ -181,8 +148,9 @@ class URController:
     def restore(self) -> None:
         """Cable in, button released, arm powered, in remote control, no program loaded."""
         with self._lock:
-            self.stop_program("restored")
-            self.mute = self.deaf = False
+            self._end_program()
+            self.halt("restored")
+            self.faults = URFaults()
             self.remote_control = True
             self.safety, self.robot_mode = Safety.NORMAL, Robot.RUNNING
 
@@ -200,10 +168,14 @@ class URController:
     def load(self, source: str) -> None:
         """A program came in on a script port: it takes the place of the one that runs."""
         with self._lock:
+            control = "def rtde_control():" in source
+            if self.stop_orders.refused and not control:
+                self.note("script refused")
+                return
             self.stop_program("replaced by another program")
             if self.safety is not Safety.NORMAL or self.robot_mode is not Robot.RUNNING:
                 return
-            if "def rtde_control():" in source:
+            if control:
                 self._program = ControlProgram(self, source)
                 self.runtime = Runtime.PLAYING
 
@@ -218,12 +190,14 @@ class URController:
             return True
 
     def stop_program(self, why: str) -> None:
-        """End the program and its motion."""
+        """End the program and its motion, as far as the faults let it."""
         with self._lock:
-            self._program = None
-            self._target = None
-            self.runtime = Runtime.STOPPED
-            self.halt(why)
+            self._end_program()
+            self.stop_orders.take(why)
+
+    def stop_motion(self, why: str) -> None:
+        """End the motion and not the program, as far as the faults let it."""
+        self.stop_orders.take(why)
 
     def unlock_protective_stop(self) -> bool:
         """Release a protective stop, which the controller does after five seconds."""
@@ -240,10 +214,10 @@ class URController:
             self.arm.start_move(target)
         except (SafetyError, DeviceError) as error:
             self.note(f"refused by the arm: {error}")
-            self.stop_program("motion impossible")
+            self._end_program()
 
     def halt(self, why: str) -> None:
-        """Stop the arm."""
+        """Stop the arm, whatever the faults say."""
         if self.arm.state().motion is Motion.MOVING:
             self.note(f"halt: {why}")
         self.arm.stop()
@@ -255,6 +229,10 @@ class URController:
         if self.runtime is Runtime.PLAYING:
             self._target = None
         return True
+
+    def steady(self) -> bool:
+        """Whether the arm has been at rest for long enough to be called steady."""
+        return self.arm.state().motion is Motion.STEADY
 
     def write_inputs(self, values: dict[str, Value]) -> None:
         """Take an input package from an RTDE client."""
@@ -269,8 +247,13 @@ class URController:
     def read_outputs(self) -> dict[str, Value]:
         """Return every variable of this cycle, all of the same instant."""
         with self._lock:
-            state = self.arm.state()
+            state = self._reported()
             return {**self.registers, **self._status(), **self._kinematics(state)}
+
+    def _end_program(self) -> None:
+        self._program = None
+        self._target = None
+        self.runtime = Runtime.STOPPED
 
     def _status(self) -> dict[str, Value]:
         powered = self.robot_mode is Robot.RUNNING
@@ -307,8 +290,12 @@ class URController:
         with self._lock:
             if self._program is not None and self.runtime is Runtime.PLAYING:
                 self._program.tick()
-            if self._program is not None and self._program.watchdog_expired():
-                self.note("watchdog")
-                self.stop_program("watchdog")
-        if not self.mute:
+            self._watch_client()
+        if not self.faults.mute:
             self._rtde.publish(self.read_outputs())
+
+    def _watch_client(self) -> None:
+        program = self._program
+        if program is not None and program.watchdog_expired() and not self.faults.watchdog_fails:
+            self.note("watchdog")
+            self.stop_program("watchdog")

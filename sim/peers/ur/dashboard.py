@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from sim.peers.ur.controller import URController
+from sim.peers.controller_faults import ControllerFaults, StopOrders
+from sim.peers.ur.modes import Robot, Runtime, Safety
 
 _UNLOCK_TOO_EARLY = (
     "Cannot unlock protective stop until 5s after occurrence. "
@@ -19,10 +19,40 @@ _UNLOCK_TOO_EARLY = (
 _LOCAL = "Not in remote control"
 
 
+class Controller(Protocol):
+    """What this server tells of its controller, and what it orders."""
+
+    version: tuple[int, int, int, int]
+    remote_control: bool
+    robot_mode: Robot
+    safety: Safety
+    runtime: Runtime
+
+    @property
+    def faults(self) -> ControllerFaults:
+        """What goes wrong with it."""
+
+    @property
+    def stop_orders(self) -> StopOrders:
+        """How orders to stop are taken."""
+
+    def note(self, what: str) -> None:
+        """Remember that something arrived."""
+
+    def stop_program(self, why: str) -> None:
+        """End the program and its motion."""
+
+    def play(self) -> bool:
+        """Resume a paused program; return whether there was one."""
+
+    def unlock_protective_stop(self) -> bool:
+        """Release a protective stop; return whether it was time."""
+
+
 class DashboardServer:
     """Serves dashboard clients of one controller."""
 
-    def __init__(self, controller: URController) -> None:
+    def __init__(self, controller: Controller) -> None:
         self._controller = controller
         self._questions: dict[str, Callable[[], str]] = {
             "polyscopeversion": self._polyscope,
@@ -43,13 +73,13 @@ class DashboardServer:
 
     def serve(self, link: socket.socket) -> None:
         """Answer one client until it goes."""
-        if not self._controller.mute:
+        if not self._controller.faults.mute:
             link.sendall(b"Connected: Universal Robots Dashboard Server\n")
         for line in link.makefile("r", encoding="utf-8"):
-            if self._controller.deaf:
+            if self._controller.faults.deaf:
                 continue
             answer = self._answer(line.strip())
-            if not self._controller.mute:
+            if not self._controller.faults.mute:
                 link.sendall(f"{answer}\n".encode())
 
     def _answer(self, line: str) -> str:
@@ -65,6 +95,8 @@ class DashboardServer:
         return "URSoftware {}.{}.{}.{} (Jun 09 2023)".format(*self._controller.version)
 
     def _stop(self) -> str:
+        if self._controller.stop_orders.refused:
+            return "Failed to execute: stop"
         self._controller.stop_program("dashboard stop")
         return "Stopped"
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import socket
 import struct
 import time
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from sim.peers.ur.controller import URController
+from calib.chain.kinematics import ArmKinematics
+from sim.peers.controller_faults import ControllerFaults
 
 _PERIOD_S = 0.1
 _MESSAGE, _ROBOT_STATE = 20, 16
@@ -21,17 +21,27 @@ _ROBOT_MODE, _KINEMATICS = 0, 5
 _LINEARISED = 2
 
 
+class Controller(Protocol):
+    """What this port shows of its controller."""
+
+    kinematics: ArmKinematics | None
+
+    @property
+    def faults(self) -> ControllerFaults:
+        """What goes wrong with it."""
+
+
 class PrimaryServer:
     """Sends robot states of one controller."""
 
-    def __init__(self, controller: URController) -> None:
+    def __init__(self, controller: Controller) -> None:
         self._controller = controller
 
     def serve(self, link: socket.socket) -> None:
         """Send a version message, then a robot state ten times a second."""
         link.sendall(_package(_MESSAGE, struct.pack(">QBB", 0, 254, 3) + b"\x09URControl"))
         while True:
-            if not self._controller.mute:
+            if not self._controller.faults.mute:
                 link.sendall(_package(_ROBOT_STATE, self._state()))
             time.sleep(_PERIOD_S)
 

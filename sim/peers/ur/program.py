@@ -9,19 +9,42 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from drivers.arm import Motion, MoveTarget
+from drivers.arm import MoveTarget
 from drivers.ur.pose import base_from_flange
-
-if TYPE_CHECKING:
-    from sim.peers.ur.controller import URController
 
 READY, DONE = 1, 2
 MOVE_J, MOVE_J_IK, MOVE_L = 1, 2, 3
 SET_TCP, STOP_L, STOP_J, SET_WATCHDOG, GET_TCP_OFFSET, IS_STEADY = 29, 33, 34, 35, 40, 47
 KICK, STOP_SCRIPT = 99, 255
 _RUNNING = 1 << 15
+
+
+class Controller(Protocol):
+    """What the program reads and orders of the controller it runs on."""
+
+    registers: dict[str, int | float]
+    tcp_offset: tuple[float, ...]
+
+    @staticmethod
+    def now() -> float:
+        """Host clock in seconds."""
+
+    def begin_move(self, target: MoveTarget) -> None:
+        """Start a motion of the program."""
+
+    def at_rest(self) -> bool:
+        """Whether the arm has come to rest."""
+
+    def steady(self) -> bool:
+        """Whether it has been at rest for long enough to be called steady."""
+
+    def stop_motion(self, why: str) -> None:
+        """End the motion, not the program."""
+
+    def stop_program(self, why: str) -> None:
+        """End the program and its motion."""
 
 
 class ControlProgram:
@@ -35,7 +58,7 @@ class ControlProgram:
         The script's text; only the register offset is read from it.
     """
 
-    def __init__(self, controller: URController, source: str) -> None:
+    def __init__(self, controller: Controller, source: str) -> None:
         self._controller = controller
         # the client puts the number behind the comment that marks its place
         offset = re.search(r"# int register offset\s+(\d+)", source)
@@ -112,7 +135,7 @@ class ControlProgram:
             self._busy = controller.at_rest
 
     def _stop(self, command: int) -> None:
-        self._controller.halt(f"script command {command}")
+        self._controller.stop_motion(f"script command {command}")
         self._busy = self._controller.at_rest
 
     def _set_tcp(self, _: int) -> None:
@@ -124,7 +147,7 @@ class ControlProgram:
             self._controller.registers[name] = value
 
     def _is_steady(self, _: int) -> None:
-        self._set_out(1, int(self._controller.arm.state().motion is Motion.STEADY))
+        self._set_out(1, int(self._controller.steady()))
 
     def _set_watchdog(self, _: int) -> None:
         self._watchdog_s = 1.0 / self._in_doubles(0, 1)[0]

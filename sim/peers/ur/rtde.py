@@ -8,12 +8,10 @@ import socket
 import struct
 import threading
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from drivers.ur.wire import Frame, Recipe, Value, encode, receive
-
-if TYPE_CHECKING:
-    from sim.peers.ur.controller import URController
+from sim.peers.ur.faults import URFaults
 
 _OUTPUTS = {
     "timestamp": "DOUBLE",
@@ -50,21 +48,31 @@ class _Client:
             self.link.sendall(encode(kind, payload))
 
 
+class Controller(Protocol):
+    """What this server tells of its controller, and where it writes."""
+
+    version: tuple[int, int, int, int]
+    faults: URFaults
+
+    def write_inputs(self, values: dict[str, Value]) -> None:
+        """Take an input package from a client."""
+
+
 class RtdeServer:
     """Serves RTDE clients of one controller."""
 
-    def __init__(self, controller: URController) -> None:
+    def __init__(self, controller: Controller) -> None:
         self._controller = controller
         self._clients: list[_Client] = []
 
     def serve(self, link: socket.socket) -> None:
         """Answer one client until it goes."""
-        client = _Client(link, ignored=self._controller.ignore_new_clients)
+        client = _Client(link, ignored=self._controller.faults.ignore_new_clients)
         self._clients.append(client)
         try:
             while True:
                 kind, payload = receive(link)
-                if not self._controller.deaf and not client.ignored:
+                if not self._controller.faults.deaf and not client.ignored:
                     self._handle(client, kind, payload)
         finally:
             self._clients.remove(client)
@@ -85,7 +93,7 @@ class RtdeServer:
                 self._controller.write_inputs(recipe.unpack(payload[1:]))
             return
         answer = self._answer(client, kind, payload)
-        if not self._controller.mute:
+        if not self._controller.faults.mute:
             client.send(kind, answer)
         client.started = client.started or kind == Frame.START
 
@@ -113,13 +121,13 @@ class RtdeServer:
         return bytes([len(client.inputs)]) + ",".join(types).encode()
 
     def _output_type(self, name: str) -> str:
-        unknown = name in self._controller.missing_outputs
+        unknown = name in self._controller.faults.missing_outputs
         return "NOT_FOUND" if unknown else _type_of(name, _OUTPUTS)
 
     def _input_type(self, client: _Client, name: str) -> str:
         others = (other for other in self._clients if other is not client)
         taken = any(name in recipe.names for other in others for recipe in other.inputs)
-        if taken or name in self._controller.reserved_inputs:
+        if taken or name in self._controller.faults.reserved_inputs:
             return "IN_USE"
         return _type_of(name, _INPUTS)
 

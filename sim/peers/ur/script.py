@@ -8,16 +8,31 @@ to remote control, as on an e-Series.
 from __future__ import annotations
 
 import socket
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from sim.peers.ur.controller import URController
+from sim.peers.controller_faults import ControllerFaults
+
+
+class Controller(Protocol):
+    """What programs are handed to."""
+
+    remote_control: bool
+
+    @property
+    def faults(self) -> ControllerFaults:
+        """What goes wrong with it."""
+
+    def note(self, what: str) -> None:
+        """Remember that something arrived."""
+
+    def load(self, source: str) -> None:
+        """Run a program in place of the one that runs."""
 
 
 class ScriptServer:
     """Serves script clients of one controller."""
 
-    def __init__(self, controller: URController) -> None:
+    def __init__(self, controller: Controller) -> None:
         self._controller = controller
 
     def serve(self, link: socket.socket) -> None:
@@ -25,7 +40,7 @@ class ScriptServer:
         writable = self._controller.remote_control
         program: list[str] = []
         for line in link.makefile("r", encoding="utf-8"):
-            if self._controller.deaf or not writable:
+            if self._controller.faults.deaf or not writable:
                 continue
             program.append(line)
             if line.rstrip() == "end" or not program[0].startswith("def "):

@@ -135,7 +135,7 @@ def test_the_arm_stops_when_our_process_is_killed_on_the_way():
 
 def test_a_controller_that_falls_silent_holds_nobody_up_and_is_told():
     with moving() as (arm, controller, _):
-        controller.faults.mute = True
+        controller.cut()
         begin_s = time.monotonic()
         arm.stop()
         assert time.monotonic() - begin_s < 0.1
@@ -153,7 +153,7 @@ def test_a_controller_that_falls_silent_holds_nobody_up_and_is_told():
 
         assert until(told, 3.0)
         assert np.median(durations_s) < 0.05
-        controller.faults.mute = False
+        controller.faults.mend_cable()
 
 
 def test_a_dead_controller_fails_the_stop_loudly_and_at_once():
@@ -170,11 +170,11 @@ def test_a_cut_cable_stops_the_motion_under_way():
     def measure():
         with moving() as (_, controller, sim):
             since_s = time.monotonic()
-            controller.faults.mute = True
+            controller.cut()
             latency_s = halted_s(controller, since_s)
             assert until(lambda: not truly_moving(sim))
             assert stays(sim)
-            controller.faults.mute = False
+            controller.faults.mend_cable()
             return latency_s
 
     best_of_three(measure, LINK_WATCH_S + GOAL_S)
@@ -183,9 +183,9 @@ def test_a_cut_cable_stops_the_motion_under_way():
 def test_a_cut_cable_that_nobody_watches_stops_nothing():
     # the hazard itself, so that the test above means something
     with moving(link_watch_s=None) as (_, controller, sim):
-        controller.faults.mute = True
+        controller.cut()
         assert not until(lambda: not truly_moving(sim), 2 * LINK_WATCH_S)
-        controller.faults.mute = False
+        controller.faults.mend_cable()
 
 
 def test_the_arm_stops_when_our_process_hangs_on_the_way():
@@ -204,9 +204,9 @@ def test_the_arm_stops_when_our_process_hangs_on_the_way():
 
 def test_a_motion_that_the_controller_stopped_for_silence_is_told_as_such():
     with moving() as (arm, controller, _):
-        controller.faults.mute = True
+        controller.cut()
         assert until(lambda: controller.watch.values["stops"] == 1)
-        controller.faults.mute = False
+        controller.faults.mend_cable()
         assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT, 3.0)
         assert "heard nothing" in arm.state().fault
         assert "check the cable" in arm.state().fault
@@ -226,15 +226,15 @@ def test_nobody_is_watched_while_the_arm_stands():
         arm.start_move(quickly(tuple(angle + 0.05 for angle in ABB_HOME)))
         wait_steady(arm)
         assert until(lambda: controller.watch.values["beat"] == 0)
-        controller.faults.mute = True
+        controller.cut()
         time.sleep(1.5 * LINK_WATCH_S)
         assert controller.watch.values["stops"] == 0
-        controller.faults.mute = False
+        controller.faults.mend_cable()
 
 
 def test_a_refused_stop_switches_the_motors_off():
     with moving() as (arm, controller, sim):
-        controller.faults.stop_refused = True
+        controller.faults.rapid_stop_refused = True
         arm.stop()
         assert until(lambda: not truly_moving(sim), 1.0)
         assert controller.panel.controller == "motoroff"

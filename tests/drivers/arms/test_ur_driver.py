@@ -42,7 +42,7 @@ LOWER_REGISTERS = frozenset(
 
 def test_registers_held_by_a_fieldbus_are_told_and_the_upper_ones_serve():
     with ur_peer() as (controller, _):
-        controller.reserved_inputs = LOWER_REGISTERS
+        controller.faults.reserved_inputs = LOWER_REGISTERS
         with pytest.raises(DeviceRefused, match="upper_registers"):
             URArm(controller.address).connect()
         arm = URArm(controller.address, URSettings(upper_registers=True))
@@ -91,7 +91,7 @@ def test_a_program_that_is_not_ours_is_left_running():
 
 def test_a_controller_too_old_for_the_tool_offset_is_refused():
     with ur_peer() as (controller, _):
-        controller.missing_outputs = frozenset({"tcp_offset"})
+        controller.faults.missing_outputs = frozenset({"tcp_offset"})
         with pytest.raises(DeviceRefused, match="tcp_offset"):
             URArm(controller.address).connect()
 

@@ -46,7 +46,7 @@ def drop(controller, arm):
 
 
 def mute(controller, arm):
-    controller.mute = True
+    controller.faults.mute = True
 
 
 def frozen_child(controller, arm):
@@ -142,7 +142,7 @@ def test_a_dead_controller_holds_nobody_up():
 
 def test_a_controller_that_never_answers_is_told_as_such_and_freezes_nothing():
     with ur_peer() as (controller, _):
-        controller.mute = controller.deaf = True
+        controller.cut()
         arm = URArm(controller.address)
         begin_s = time.monotonic()
         with pytest.raises(DeviceUnreachable, match="did not answer"):
@@ -156,7 +156,7 @@ def frozen_in_constructor(**settings):
     with ur_moving(**settings) as (arm, controller, sim):
         arm.stop()
         wait_steady(arm)
-        controller.ignore_new_clients = True
+        controller.faults.ignore_new_clients = True
         arm.start_move(slowly(UR_HOME))
         assert until(lambda: arm._supervisor._child is not None)
         time.sleep(0.3)

@@ -1,0 +1,22 @@
+"""The controller's panel, and what goes wrong with the controller on command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sim.peers.controller_faults import ControllerFaults
+
+
+@dataclass
+class PanelState:
+    """``controller`` is RWS's ctrlstate, ``mode`` its opmode."""
+
+    controller: str = "motoron"
+    mode: str = "AUTO"
+
+
+@dataclass
+class ABBFaults(ControllerFaults):
+    """Those of every controller, and: only RAPID's stop is refused, not motors off."""
+
+    rapid_stop_refused: bool = False
