@@ -11,9 +11,6 @@ from scipy.stats import chi2
 from calib.chain.effect import Present
 from calib.chain.model import kinematics_of, walk
 from calib.discovery.ambiguity import ambiguities
-from calib.discovery.bookkeeping.branches import choose_branches, with_branches
-from calib.discovery.bookkeeping.slip import Slip
-from calib.discovery.books import Books, keep_books
 from calib.discovery.candidates import unseen
 from calib.discovery.diagnosis import (
     Diagnosis,
@@ -23,10 +20,13 @@ from calib.discovery.diagnosis import (
     Value,
     Verdict,
 )
-from calib.discovery.leftover import Leftover, look_for_leftover
 from calib.discovery.locate import Cell, locate
+from calib.discovery.log_consistency.branches import choose_branches, with_branches
+from calib.discovery.log_consistency.mixup import Mixup
+from calib.discovery.log_repair import LogRepair, repair_log
 from calib.discovery.pictures import fit_blur, told_of
 from calib.discovery.prove import held_out, prediction_rms_px, prove
+from calib.discovery.residual_structure import ResidualStructure, find_residual_structure
 from calib.discovery.scatter import scattered
 from calib.discovery.search import Search
 from calib.discovery.split import split_misfit
@@ -59,46 +59,46 @@ def diagnose(
     CalibrationError
         When the recording cannot even be calibrated.
     """
-    books = keep_books(views, views if log is None else log)
-    books, branch_price = _with_branches(books)
-    held = held_out(len(books.views))
-    fitter = Fitter(books.views.take(~held), books.has_robot)
-    before = fit_start(fitter, books.free, ~held)
+    repaired = repair_log(views, views if log is None else log)
+    repaired, branch_price = _with_branches(repaired)
+    held = held_out(len(repaired.views))
+    fitter = Fitter(repaired.views.take(~held), repaired.has_robot)
+    before = fit_start(fitter, repaired.free, ~held)
     search = Search(before, fitter, branch_price)
     if forced is None:
-        leftover = _searched(search, before)
+        structure = _searched(search, before)
     else:
         search.force(forced)
-        leftover = Leftover(search, ())
-    return _told(books, held, before, leftover)
+        structure = ResidualStructure(search, ())
+    return _diagnosis(repaired, held, before, structure)
 
 
-def _searched(search: Search, before: JointFit) -> Leftover:
+def _searched(search: Search, before: JointFit) -> ResidualStructure:
     """Search; and once more with a focal length that scatters by chance, where it does."""
     search.run()
-    leftover = look_for_leftover(search)
-    scatter = scattered(leftover)
+    structure = find_residual_structure(search)
+    scatter = scattered(structure)
     if scatter is None:
-        return leftover
+        return structure
     noise = replace(before.noise, focal=scatter.relative)
     start = search.fitter.fit(before.model, noise, before.own_error)
     again = Search(start, search.fitter, search.branch_price)
     again.run()
-    return look_for_leftover(again, (scatter.cell,))
+    return find_residual_structure(again, (scatter.cell,))
 
 
-def _with_branches(books: Books) -> tuple[Books, float]:
+def _with_branches(repaired: LogRepair) -> tuple[LogRepair, float]:
     """Choose the arm's branches where joints were not logged; and the price of the choice."""
-    views = books.views
+    views = repaired.views
     kinematics = kinematics_of(views)
-    if books.joints_logged or not books.has_robot or kinematics is None:
-        return books, 0.0
+    if repaired.joints_logged or not repaired.has_robot or kinematics is None:
+        return repaired, 0.0
     every = np.ones(len(views), dtype=bool)
-    chosen = choose_branches(fit_start(Fitter(views), books.free, every), views, kinematics)
+    chosen = choose_branches(fit_start(Fitter(views), repaired.free, every), views, kinematics)
     mended = replace(
-        books,
+        repaired,
         views=with_branches(views, chosen, views.frame),
-        log=with_branches(books.log, chosen, views.frame),
+        log=with_branches(repaired.log, chosen, views.frame),
     )
     return mended, chosen.price
 
@@ -113,31 +113,35 @@ class _Fits:
     plain: JointFit
 
 
-def _told(books: Books, held: BoolArray, before: JointFit, leftover: Leftover) -> Diagnosis:
-    search = leftover.search
+def _diagnosis(
+    repaired: LogRepair, held: BoolArray, before: JointFit, structure: ResidualStructure
+) -> Diagnosis:
+    search = structure.search
     after = search.best.fit
-    everything = Fitter(books.views, books.has_robot)
-    twin = everything.settled(_restarted(after, len(books.views), held))
+    everything = Fitter(repaired.views, repaired.has_robot)
+    twin = everything.settled(_restarted(after, len(repaired.views), held))
     plain = everything.fit(before.model, before.noise)
     judge = _judge(plain.noise, twin.noise)
     fits = _Fits(before, after, twin, plain)
-    held_views = books.views.take(held)
+    held_views = repaired.views.take(held)
     proof = prove(before, after, held_views)
-    named = tuple(_slip(slip) for slip in books.slips) + _named(fits, held_views, search.fitter)
+    named = tuple(_mixup(mixup) for mixup in repaired.mixups) + _named(
+        fits, held_views, search.fitter
+    )
     return Diagnosis(
-        verdict=_verdict(named, leftover),
+        verdict=_verdict(named, structure),
         effects=named,
         ambiguous_with=ambiguities(search),
-        unexplained=_unexplained(leftover),
+        unexplained=_unexplained(structure),
         mismatch=_mismatches(fits, everything),
         split=(split_misfit(plain, judge), split_misfit(twin, judge)),
         proof=proof,
         plain=plain,
         twin=twin,
-        views=books.views,
-        log=books.log,
-        rejected=books.rejected,
-        said=(*books.said, *_pictures(twin, books.views), *_unseen(books.views)),
+        views=repaired.views,
+        log=repaired.log,
+        rejected=repaired.rejected,
+        said=(*repaired.said, *_pictures(twin, repaired.views), *_unseen(repaired.views)),
     )
 
 
@@ -148,20 +152,20 @@ def _restarted(fit: JointFit, frames: int, held: BoolArray) -> JointFit:
     return replace(fit, own_error=error)
 
 
-def _verdict(named: Sequence[NamedEffect], leftover: Leftover) -> Verdict:
-    if leftover.cells:
+def _verdict(named: Sequence[NamedEffect], structure: ResidualStructure) -> Verdict:
+    if structure.cells:
         return "unexplained"
     return "explained" if named else "consistent"
 
 
-def _slip(slip: Slip) -> NamedEffect:
+def _mixup(mixup: Mixup) -> NamedEffect:
     return NamedEffect(
-        name=slip.name,
+        name=mixup.name,
         link="bookkeeping",
         law=None,
-        physics=slip.physics,
-        remedy=slip.remedy,
-        parameters={k: Value(v, 0.0, unit) for k, (v, unit) in slip.parameters.items()},
+        physics=mixup.physics,
+        remedy=mixup.remedy,
+        parameters={k: Value(v, 0.0, unit) for k, (v, unit) in mixup.parameters.items()},
         p_value=0.0,
         holdout_gain_px=0.0,
     )
@@ -213,10 +217,10 @@ def _values(twin: JointFit, index: int) -> dict[str, Value]:
     }
 
 
-def _unexplained(leftover: Leftover) -> Unexplained | None:
-    if not leftover.cells:
+def _unexplained(structure: ResidualStructure) -> Unexplained | None:
+    if not structure.cells:
         return None
-    cell = leftover.cells[0]
+    cell = structure.cells[0]
     return Unexplained(cell.link, cell.site, cell.covariate, cell.where, cell.p_value)
 
 

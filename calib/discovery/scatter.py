@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from calib.discovery.leftover import Leftover, is_shape_of_law
 from calib.discovery.locate import Cell
+from calib.discovery.residual_structure import ResidualStructure, is_shape_of_law
 from calib.discovery.score import Score
 
 _WORTH = 30.0
@@ -34,7 +34,7 @@ class Scatter:
     cell: Cell
 
 
-def scattered(leftover: Leftover) -> Scatter | None:
+def scattered(leftover: ResidualStructure) -> Scatter | None:
     """How the focal length scatters in the best cell that was found; None where it does not.
 
     A field of shifts that is left in the pictures bends poses along the axis, too: beside one

@@ -63,15 +63,15 @@ def peer_devices(plan: Plan) -> Iterator[Devices]:
 
 
 def _true_cell(plan: Plan, seed: int | None) -> SimulatedCell:
-    from cell.devices.log_mixups import SLIPS
+    from cell.devices.log_mixups import MIXUPS
     from cell.devices.simulated_cell import home_of, simulated_cell
 
     truth = plan.cell.simulation
-    slips = [effect.name for effect in truth.effects if effect.name in SLIPS] if truth else []
-    if slips:
+    mixups = [effect.name for effect in truth.effects if effect.name in MIXUPS] if truth else []
+    if mixups:
         raise InputError(
-            f"cell {plan.cell.name}: {', '.join(slips)} is a slip of the log, and this log is true;"
-            " `cell simulate` without --images can make it"
+            f"cell {plan.cell.name}: {', '.join(mixups)} is a mix-up in the log, and this log is"
+            " true; `cell simulate` without --images can make it"
         )
     return simulated_cell(plan.cell, home_of(plan), seed=seed)
 

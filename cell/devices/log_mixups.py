@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from calib.chain import rigid
 from calib.chain.kinematics import UnknownArm, arm
-from calib.discovery.bookkeeping.slip import ROBOT_COLUMNS
+from calib.discovery.log_consistency.mixup import ROBOT_COLUMNS
 from calib.views import FloatArray, Views
 from cell.errors import InputError
 from cell.storage.files.cell_file import EffectFile
@@ -23,7 +23,7 @@ from cell.storage.files.cell_file import EffectFile
 
 def slip(views: Views, effect: EffectFile, rng: np.random.Generator) -> Views:
     """The views with one slip in their log; raises `InputError` where it is not understood."""
-    return SLIPS[effect.name](views, effect, rng)
+    return MIXUPS[effect.name](views, effect, rng)
 
 
 def _offset(views: Views, effect: EffectFile, rng: np.random.Generator) -> Views:
@@ -93,7 +93,7 @@ def _model(views: Views, effect: EffectFile, rng: np.random.Generator) -> Views:
     return replace(views, base_from_flange=poses, robot_model=wrong.name)
 
 
-SLIPS: dict[str, Callable[[Views, EffectFile, np.random.Generator], Views]] = {
+MIXUPS: dict[str, Callable[[Views, EffectFile, np.random.Generator], Views]] = {
     "frame_pose_offset": _offset,
     "frame_pose_swap": _swap,
     "length_unit": _unit,

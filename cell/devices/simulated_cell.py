@@ -11,7 +11,7 @@ from calib.chain.effects import make_effect
 from calib.chain.model import CellModel
 from calib.chain.optics import OPTICS, optics_row
 from calib.views import FloatArray, Views
-from cell.devices.log_mixups import SLIPS
+from cell.devices.log_mixups import MIXUPS
 from cell.errors import InputError
 from cell.sequencer.guard import Guard
 from cell.storage.files.camera_file import Lens
@@ -92,7 +92,7 @@ def _model(cell: CellFile, truth: Simulation) -> CellModel:
         flange_from_mounted=truth.mounted.transform().as_matrix(),
         base_from_fixed=truth.fixed.transform().as_matrix(),
         effects=tuple(
-            present_effect(effect, where) for effect in truth.effects if effect.name not in SLIPS
+            present_effect(effect, where) for effect in truth.effects if effect.name not in MIXUPS
         ),
     )
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform
 
 from calib.views import Views
 from cell.devices.factory import simulated_devices
-from cell.devices.log_mixups import SLIPS, slip
+from cell.devices.log_mixups import MIXUPS, slip
 from cell.devices.simulated_cell import home_of, log_of, present_effect, simulated_cell
 from cell.errors import BadAnswer, InputError
 from cell.sequencer.session import header_of, record_plan
@@ -80,7 +80,7 @@ def simulated_views(plan: Plan, cell: SimulatedCell) -> Views:
     effects = plan.cell.simulation.effects if plan.cell.simulation else ()
     rng = cell.random(_SLIP_STREAM)
     for effect in effects:
-        if effect.name in SLIPS:
+        if effect.name in MIXUPS:
             views = slip(views, effect, rng)
     return views
 
@@ -112,7 +112,7 @@ def with_effects(plan: Plan, effects: tuple[str, ...]) -> Plan:
         return plan
     parsed = tuple(parse_effect(text) for text in effects)
     for effect in parsed:
-        if effect.name not in SLIPS:
+        if effect.name not in MIXUPS:
             present_effect(effect, "--effect")
     return with_truth(plan, truth.model_copy(update={"effects": parsed}))
 

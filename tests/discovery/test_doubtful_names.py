@@ -9,9 +9,9 @@ import numpy as np
 from calib.chain.effects import make_effect
 from calib.chain.empirical import Curve, covariate_named, present_curve, site_named
 from calib.chain.model import kinematics_of, walk
-from calib.discovery.bookkeeping.branches import Branches, choose_branches
-from calib.discovery.books import keep_books
 from calib.discovery.fields import field_scores
+from calib.discovery.log_consistency.branches import Branches, choose_branches
+from calib.discovery.log_repair import repair_log
 from calib.discovery.search import Search
 from calib.discovery.start import Fitter, fit_start
 from calib.solver.noise import Noise
@@ -49,7 +49,7 @@ def branches_of(views: Views) -> tuple[Views, Branches]:
         joint_velocity_rad_s=nothing,
         approach_joints_rad=nothing,
     )
-    books = keep_books(bare, bare)
+    books = repair_log(bare, bare)
     kinematics = kinematics_of(books.views)
     assert kinematics is not None
     fit = fit_start(Fitter(books.views), books.free, np.ones(len(books.views), dtype=bool))

@@ -10,7 +10,7 @@ import pytest
 from calib.chain.effects import make_effect
 from calib.chain.empirical import Curve, covariate_named, present_curve, site_named
 from calib.chain.model import walk
-from calib.discovery.leftover import look_for_leftover
+from calib.discovery.residual_structure import find_residual_structure
 from calib.discovery.search import Search, criterion
 from calib.discovery.start import Fitter
 from calib.views import Views
@@ -28,7 +28,7 @@ def searched(views: Views) -> Search:
 
 def names(views: Views) -> list[str]:
     """What is named; nothing must be left over."""
-    found = look_for_leftover(searched(views))
+    found = find_residual_structure(searched(views))
     assert found.cells == ()
     return [present.effect.name for present in found.search.best.fit.model.effects]
 

@@ -12,7 +12,7 @@ from calib.chain.kinematics import arm
 from calib.chain.model import walk
 from calib.chain.projection import project
 from calib.discovery.diagnose import diagnose
-from calib.discovery.leftover import Leftover
+from calib.discovery.residual_structure import ResidualStructure
 from calib.discovery.scatter import scattered
 from calib.discovery.search import Search
 from calib.discovery.start import Fitter
@@ -89,9 +89,9 @@ def test_one_frame_that_is_far_off_is_no_scatter():
     corners = project(state.optics, state.camera_from_board, state.points_m)
     corners += NOISE.corner_px * np.random.default_rng(74).standard_normal(corners.shape)
     search = searched(replace(LOG, corners_px=corners))
-    assert scattered(Leftover(search, ())) is None
+    assert scattered(ResidualStructure(search, ())) is None
     wide = searched(with_focus_by_chance(75)[0])
-    found = scattered(Leftover(wide, ()))
+    found = scattered(ResidualStructure(wide, ()))
     assert found is not None
     assert 0.5 * SCATTER < found.relative < 1.6 * SCATTER
 

@@ -12,8 +12,8 @@ from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue
 from calib.discovery.diagnose import diagnose
 from calib.discovery.diagnosis import Diagnosis
-from calib.discovery.leftover import ALARM
 from calib.discovery.locate import locate
+from calib.discovery.residual_structure import ALARM
 from calib.discovery.search import Search
 from calib.discovery.start import Fitter
 from calib.views import FloatArray, Views

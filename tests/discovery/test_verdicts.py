@@ -10,8 +10,8 @@ import pytest
 from calib.chain import rigid
 from calib.chain.effects import make_effect
 from calib.chain.model import CellModel, predict
-from calib.discovery.books import keep_books
 from calib.discovery.diagnose import diagnose
+from calib.discovery.log_repair import repair_log
 from calib.solver.noise import Noise
 from calib.views import Views
 from tests.discovery.simulated_runs import NOISE, log, plain_cell, record
@@ -122,7 +122,7 @@ def without(*columns: str) -> Views:
 
 def test_joints_that_were_not_logged_are_worked_out_and_that_is_said():
     bare = without("joints_rad", "joint_velocity_rad_s", "approach_joints_rad")
-    books = keep_books(bare, bare)
+    books = repair_log(bare, bare)
     assert np.isfinite(books.views.joints_rad).all()
     assert "joints" in " ".join(books.said)
 

@@ -73,7 +73,7 @@ class MismatchPart(ResultPart):
 
 
 class EffectPart(ResultPart):
-    """Named physics, or a slip of the log."""
+    """Named physics, or a mix-up in the log."""
 
     name: str
     link: str

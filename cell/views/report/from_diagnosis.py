@@ -30,7 +30,7 @@ def diagnosis_evidence(
     ----------
     views, mended:
         The N frames of the report as they were logged, and those the diagnosis used, their
-        book-keeping mended; frames are matched by number.
+        the log mended; frames are matched by number.
     before, twin:
         The plain cell, and the one with all that was found.
     corner_px, flange_m:

@@ -11,7 +11,7 @@ import pyarrow as pa
 from rich.table import Table
 
 from calib.calibration import calibrate
-from cell.devices.log_mixups import SLIPS
+from cell.devices.log_mixups import MIXUPS
 from cell.devices.simulated_cell import present_effect
 from cell.storage.files.plan_file import Plan
 from cell.storage.files.study_file import Case, Study
@@ -62,7 +62,7 @@ def _tasks(study: Study) -> list[Run]:
 
 def _check(plan: Plan, where: str) -> None:
     for effect in truth_of(plan).effects:
-        if effect.name not in SLIPS:
+        if effect.name not in MIXUPS:
             present_effect(effect, where)
 
 

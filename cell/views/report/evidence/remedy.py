@@ -7,7 +7,7 @@ from typing import Any
 
 from calib.chain.effects import find_effect
 
-# slips of book-keeping are not physics, so the chain's catalogue does not have them
+# mix-ups in the log are not physics, so the chain's catalogue does not have them
 _SLIPS = {
     "frame_pose_offset": "Check how pictures and poses were paired: the log is off by one frame.",
     "frame_pose_swap": "Check how pictures and poses were paired: leave the named frames out, or "

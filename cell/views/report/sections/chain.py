@@ -23,7 +23,7 @@ def chain(data: ReportData) -> str:
     """One box a link, in the order in which a corner becomes a pixel."""
     boxes = "".join(_box(data, link, role) for link, role in _LINKS)
     slips = [_words(e) for e in _effects(data, "bookkeeping")]
-    note = html.paragraph(f"Book-keeping: {', '.join(slips)}.", "bad-note") if slips else ""
+    note = html.paragraph(f"Log: {', '.join(slips)}.", "bad-note") if slips else ""
     return f'<section id="chain"><ol class="chain">{boxes}</ol>{note}</section>'
 
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from calib.chain.kinematics import MODELS, arm
-from calib.discovery.bookkeeping.consistency import close_loop
-from calib.discovery.bookkeeping.slip import Slip
+from calib.discovery.log_consistency.consistency import close_loop
+from calib.discovery.log_consistency.mixup import Mixup
 from calib.views import FloatArray, Views
 
 _BETTER = 0.35
 _SUSPECT_M = 5e-4
 
 
-def find_robot_model(views: Views, loop: FloatArray) -> Slip | None:
+def find_robot_model(views: Views, loop: FloatArray) -> Mixup | None:
     """Find whether the logged joints, run through another model, fit better than the logged poses.
 
     Parameters
@@ -48,7 +48,7 @@ def find_robot_model(views: Views, loop: FloatArray) -> Slip | None:
             robot_model=best,
         )
 
-    return Slip(
+    return Mixup(
         name="robot_model",
         physics=f"The arm is a {best}: its kinematics fit the joints, the logged poses do not.",
         remedy=f"Say {best} in the recording, and log the poses of the arm that is really there.",

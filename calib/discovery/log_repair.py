@@ -1,4 +1,4 @@
-"""Keeping the books: every slip of the log found and mended before physics is asked."""
+"""Every mix-up in the log found and mended before physics is asked."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from calib.calibration.baseline import fit_baseline
 from calib.calibration.frames import usable_frames
 from calib.calibration.result import Rejection
 from calib.chain import rigid
-from calib.discovery.bookkeeping.consistency import mounted_from_fixed
-from calib.discovery.bookkeeping.conventions import find_conventions
-from calib.discovery.bookkeeping.pairing import find_odd_frames, find_offset
-from calib.discovery.bookkeeping.recover import recover_joints, recover_poses
-from calib.discovery.bookkeeping.robot_model import find_robot_model
-from calib.discovery.bookkeeping.slip import ROBOT_COLUMNS, Slip
-from calib.discovery.bookkeeping.which_arm import recognise_arm
+from calib.discovery.log_consistency.consistency import mounted_from_fixed
+from calib.discovery.log_consistency.conventions import find_conventions
+from calib.discovery.log_consistency.mixup import ROBOT_COLUMNS, Mixup
+from calib.discovery.log_consistency.pairing import find_odd_frames, find_offset
+from calib.discovery.log_consistency.recover import recover_joints, recover_poses
+from calib.discovery.log_consistency.robot_model import find_robot_model
+from calib.discovery.log_consistency.which_arm import recognise_arm
 from calib.discovery.start import FreeViews, free_views
 from calib.errors import CalibrationError
 from calib.views import BoolArray, FloatArray, Views
@@ -25,18 +25,18 @@ FEWEST_FRAMES = 6
 
 
 @dataclass(frozen=True)
-class Books:
+class LogRepair:
     """A log put right.
 
     Attributes
     ----------
     views:
-        The frames that can be used, slips mended, missing columns filled in.
+        The frames that can be used, mixups mended, missing columns filled in.
     log:
         Every known row of the log, mended alike.
     free:
         What the pictures of `views` say without the robot.
-    slips:
+    mixups:
         What was mended, in order.
     rejected:
         Frames left out, with reasons.
@@ -51,14 +51,14 @@ class Books:
     views: Views
     log: Views
     free: FreeViews
-    slips: tuple[Slip, ...]
+    mixups: tuple[Mixup, ...]
     rejected: tuple[Rejection, ...]
     said: tuple[str, ...]
     has_robot: bool
     joints_logged: bool
 
 
-def keep_books(views: Views, log: Views) -> Books:
+def repair_log(views: Views, log: Views) -> LogRepair:
     """Mend the log.
 
     Parameters
@@ -86,22 +86,22 @@ def keep_books(views: Views, log: Views) -> Books:
     if int((views.has_pose & good).sum()) < FEWEST_FRAMES:
         said.append("no robot poses: what a free camera pose can absorb cannot be seen")
         views = _without_robot(views, free)
-        return _books(views, log, free, [], rejected, said, False, good, True)
-    slips: list[Slip] = []
-    views, log, loop_slips = _mend_conventions(views, log, loop)
-    slips += loop_slips
+        return _log_repair(views, log, free, [], rejected, said, False, good, True)
+    mixups: list[Mixup] = []
+    views, log, loop_mixups = _mend_conventions(views, log, loop)
+    mixups += loop_mixups
     joints_logged = bool(np.isfinite(log.joints_rad).any())
     worked_out = recover_joints(log)
     log, said = worked_out.views, [*said, *worked_out.said]
     views = _rows_of(views, log)
     for find in (_offset, _robot_model):
-        slip = find(views, log, loop)
-        if slip is not None:
-            slips.append(slip)
-            views, log = slip.mend(views, log), slip.mend(log, log)
+        mixup = find(views, log, loop)
+        if mixup is not None:
+            mixups.append(mixup)
+            views, log = mixup.mend(views, log), mixup.mend(log, log)
     odd = find_odd_frames(views, loop)
     if odd.swap is not None:
-        slips.append(odd.swap)
+        mixups.append(odd.swap)
         views, log = odd.swap.mend(views, log), odd.swap.mend(log, log)
     rejected += [Rejection(f, "its pose belongs to no picture") for f in odd.dropped]
     rejected += [
@@ -115,7 +115,7 @@ def keep_books(views: Views, log: Views) -> Books:
             f"only {int(kept.sum())} frames have a board and a flange pose that belong together;"
             f" a diagnosis needs {FEWEST_FRAMES}"
         )
-    return _books(views, log, free, slips, rejected, said, True, kept, joints_logged)
+    return _log_repair(views, log, free, mixups, rejected, said, True, kept, joints_logged)
 
 
 def _rows_of(views: Views, log: Views) -> Views:
@@ -125,21 +125,21 @@ def _rows_of(views: Views, log: Views) -> Views:
     return replace(views, **{name: getattr(log, name)[row] for name in ROBOT_COLUMNS})
 
 
-def _offset(views: Views, log: Views, loop: FloatArray) -> Slip | None:
+def _offset(views: Views, log: Views, loop: FloatArray) -> Mixup | None:
     return find_offset(views, log, loop)
 
 
-def _robot_model(views: Views, log: Views, loop: FloatArray) -> Slip | None:
+def _robot_model(views: Views, log: Views, loop: FloatArray) -> Mixup | None:
     return find_robot_model(views, loop)
 
 
 def _mend_conventions(
     views: Views, log: Views, loop: FloatArray
-) -> tuple[Views, Views, list[Slip]]:
+) -> tuple[Views, Views, list[Mixup]]:
     found = find_conventions(views, loop)
-    for slip in found.slips:
-        views, log = slip.mend(views, log), slip.mend(log, log)
-    return views, log, list(found.slips)
+    for mixup in found.mixups:
+        views, log = mixup.mend(views, log), mixup.mend(log, log)
+    return views, log, list(found.mixups)
 
 
 def _without_robot(views: Views, free: FreeViews) -> Views:
@@ -149,23 +149,23 @@ def _without_robot(views: Views, free: FreeViews) -> Views:
     return replace(views, base_from_flange=flange, robot_model=None)
 
 
-def _books(
+def _log_repair(
     views: Views,
     log: Views,
     free: FreeViews,
-    slips: list[Slip],
+    mixups: list[Mixup],
     rejected: list[Rejection],
     said: list[str],
     has_robot: bool,
     kept: BoolArray,
     joints_logged: bool,
-) -> Books:
+) -> LogRepair:
     kept_free = replace(free, camera_from_board=free.camera_from_board[kept])
-    return Books(
+    return LogRepair(
         views.take(np.flatnonzero(kept)),
         log,
         kept_free,
-        tuple(slips),
+        tuple(mixups),
         tuple(rejected),
         tuple(said),
         has_robot,

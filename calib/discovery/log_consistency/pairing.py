@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.chain import rigid
-from calib.discovery.bookkeeping.consistency import Closure, close_loop
-from calib.discovery.bookkeeping.slip import ROBOT_COLUMNS, Slip
+from calib.discovery.log_consistency.consistency import Closure, close_loop
+from calib.discovery.log_consistency.mixup import ROBOT_COLUMNS, Mixup
 from calib.views import BoolArray, FloatArray, Views
 
 _SHIFTS = (-3, -2, -1, 1, 2, 3)
@@ -39,7 +39,7 @@ def shifted(views: Views, log: Views, shift: int) -> Views:
     return _rows_from(views, log, index)
 
 
-def find_offset(views: Views, log: Views, loop: FloatArray) -> Slip | None:
+def find_offset(views: Views, log: Views, loop: FloatArray) -> Mixup | None:
     """Find whether every frame is paired with a neighbour's pose.
 
     Parameters
@@ -66,7 +66,7 @@ def find_offset(views: Views, log: Views, loop: FloatArray) -> Slip | None:
     def mend(some: Views, neighbours: Views) -> Views:
         return shifted(some, neighbours, shift)
 
-    return Slip(
+    return Mixup(
         name="frame_pose_offset",
         physics=f"Every picture is paired with the pose logged {shift:+d} frames from its own.",
         remedy="Check when pose and picture are read; pair them by trigger, not by count.",
@@ -90,12 +90,12 @@ class OddFrames:
     Attributes
     ----------
     swap:
-        The slip, when some carry each other's poses.
+        The mixup, when some carry each other's poses.
     dropped:
         Frame numbers to leave out: their pose belongs to no frame.
     """
 
-    swap: Slip | None
+    swap: Mixup | None
     dropped: tuple[int, ...]
 
 
@@ -125,7 +125,7 @@ def find_odd_frames(views: Views, loop: FloatArray) -> OddFrames:
 
 
 def _odd_neighbour(odd: BoolArray, i: int) -> bool:
-    """A run of odd frames is no slip of the log: something moved and stayed there."""
+    """A run of odd frames is no mix-up in the log: something moved and stayed there."""
     return bool((i > 0 and odd[i - 1]) or odd[i + 1 : i + 2].any())
 
 
@@ -148,7 +148,7 @@ def _miss(expected: FloatArray, poses: FloatArray, closure: Closure) -> FloatArr
     return np.asarray(np.maximum(angle, np.linalg.norm(step[:, :3], axis=1) / lever))
 
 
-def _swap(views: Views, index: FloatArray, exchanged: list[int], closure: Closure) -> Slip | None:
+def _swap(views: Views, index: FloatArray, exchanged: list[int], closure: Closure) -> Mixup | None:
     if not exchanged:
         return None
     source = {int(views.frame[i]): int(views.frame[int(index[i])]) for i in exchanged}
@@ -159,7 +159,7 @@ def _swap(views: Views, index: FloatArray, exchanged: list[int], closure: Closur
         return _rows_from(some, neighbours, np.array(rows, dtype=np.float64))
 
     pairs = ", ".join(f"{a} carries the pose of {b}" for a, b in sorted(source.items()))
-    return Slip(
+    return Mixup(
         name="frame_pose_swap",
         physics=f"Some frames carry each other's poses: {pairs}.",
         remedy="Check how pictures and poses are matched; these frames were put right in the twin.",

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from calib.chain import rigid
-from calib.discovery.bookkeeping.consistency import Closure, close_loop
-from calib.discovery.bookkeeping.slip import Slip
+from calib.discovery.log_consistency.consistency import Closure, close_loop
+from calib.discovery.log_consistency.mixup import Mixup
 from calib.views import FloatArray, Views
 
 _BETTER = 0.2
@@ -74,9 +74,9 @@ _OTHERS = (
 
 @dataclass(frozen=True)
 class ConventionsFound:
-    """The slips, and the loop with them mended."""
+    """The mix-ups, and the loop with them mended."""
 
-    slips: tuple[Slip, ...]
+    mixups: tuple[Mixup, ...]
     closure: Closure | None
 
 
@@ -105,13 +105,13 @@ def find_conventions(views: Views, loop: FloatArray) -> ConventionsFound:
                 and tried.typical_distance_m < _BETTER * closure.typical_distance_m
             ):
                 chosen, closure = convention, tried
-    slips: list[Slip] = []
+    mixups: list[Mixup] = []
     if chosen is not _AS_LOGGED:
-        slips.append(_rotation_slip(chosen, logged, closure))
+        mixups.append(_rotation_mixup(chosen, logged, closure))
     unit = _unit_of(closure.length_factor)
     if unit is not None:
-        slips.append(_unit_slip(unit, closure))
-    return ConventionsFound(tuple(slips), closure)
+        mixups.append(_unit_mixup(unit, closure))
+    return ConventionsFound(tuple(mixups), closure)
 
 
 def _unit_of(factor: float) -> str | None:
@@ -124,11 +124,11 @@ def _unit_of(factor: float) -> str | None:
     return None
 
 
-def _rotation_slip(convention: _Convention, before: Closure, after: Closure) -> Slip:
+def _rotation_mixup(convention: _Convention, before: Closure, after: Closure) -> Mixup:
     def mend(views: Views, neighbours: Views) -> Views:
         return replace(views, base_from_flange=convention.read(views.base_from_flange))
 
-    return Slip(
+    return Mixup(
         name="rotation_convention",
         physics=f"The log's poses are not what they say they are: {convention.words}.",
         remedy="Correct the program that writes the log; the twin reads it as it should be.",
@@ -137,7 +137,7 @@ def _rotation_slip(convention: _Convention, before: Closure, after: Closure) -> 
     )
 
 
-def _unit_slip(unit: str, closure: Closure) -> Slip:
+def _unit_mixup(unit: str, closure: Closure) -> Mixup:
     name = unit.removeprefix("1/")
     size = _UNITS[name] if unit == name else 1.0 / _UNITS[name]
 
@@ -147,7 +147,7 @@ def _unit_slip(unit: str, closure: Closure) -> Slip:
         return replace(views, base_from_flange=pose)
 
     words = f"in {name}s" if unit == name else f"{1.0 / _UNITS[name]:g} times too small"
-    return Slip(
+    return Mixup(
         name="length_unit",
         physics=f"The log says metres, but its positions are {words}.",
         remedy="Correct the unit in the program that writes the log.",

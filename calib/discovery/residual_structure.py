@@ -23,7 +23,7 @@ _MOST_CURVES = 3
 
 
 @dataclass(frozen=True)
-class Leftover:
+class ResidualStructure:
     """The search with unnamed curves put in where they were needed, and the cells that asked."""
 
     search: Search
@@ -46,7 +46,7 @@ def is_shape_of_law(cell: Cell, search: Search) -> bool:
     )
 
 
-def look_for_leftover(search: Search, known: tuple[Cell, ...] = ()) -> Leftover:
+def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> ResidualStructure:
     """Test what is left; carry it by unnamed curves and see which names are still needed then.
 
     `known` is what is known to be left already.
@@ -66,7 +66,7 @@ def look_for_leftover(search: Search, known: tuple[Cell, ...] = ()) -> Leftover:
             break
     search.drop_on_joints({cell.site for cell in found})
     search.drop_beside_curves()
-    return Leftover(search, known + tuple(found))
+    return ResidualStructure(search, known + tuple(found))
 
 
 def _carried_finer(search: Search, found: list[Cell], views: Views) -> bool:

@@ -1,4 +1,4 @@
-"""What a slip of the log is, and how it is mended."""
+"""What a mix-up in the log is, and how it is mended."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from calib.views import Views
 
 
 @dataclass(frozen=True)
-class Slip:
-    """A slip that was found.
+class Mixup:
+    """A mix-up that was found.
 
     Attributes
     ----------

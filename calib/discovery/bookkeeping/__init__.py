@@ -1,1 +1,0 @@
-"""Slips of the log, tried before any physics: conventions, units, pairing, the wrong arm."""

@@ -1,0 +1,1 @@
+"""Mix-ups of the log, tried before any physics: conventions, units, pairing, the wrong arm."""
