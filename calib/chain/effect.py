@@ -13,10 +13,10 @@ from calib.views import FloatArray, Views
 if TYPE_CHECKING:
     from calib.chain.walk import Walk
 
-Link = Literal["clock", "arm", "mount", "board", "lens", "sensor"]
+Link = Literal["clock", "arm", "mount", "board", "lens", "sensor", "detector"]
 Role = Literal["amount", "shape", "setting"]
 
-LINKS: tuple[Link, ...] = ("clock", "arm", "mount", "board", "lens", "sensor")
+LINKS: tuple[Link, ...] = ("clock", "arm", "mount", "board", "lens", "sensor", "detector")
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,8 @@ class Effect:
         Changes the walk, given the parameters' values in their order.
     needs:
         Columns of `Views` that must have been logged.
+    needs_variation:
+        Those of them that must not be the same in every frame.
     looks_ahead:
         Asks where camera and board stand before the arm has moved.
     moving_only:
@@ -104,6 +106,7 @@ class Effect:
     remedy: str
     law: str | None = None
     needs: tuple[str, ...] = ()
+    needs_variation: tuple[str, ...] = ()
     looks_ahead: bool = False
     moving_only: bool = False
     seen_without_robot: bool = False
@@ -143,6 +146,8 @@ class Effect:
             value = getattr(views, column)
             if value is None or (isinstance(value, np.ndarray) and not np.isfinite(value).any()):
                 return f"{column} was not logged"
+            if column in self.needs_variation and np.nanmin(value) == np.nanmax(value):
+                return f"{column} was the same in every frame"
         return None
 
 

@@ -43,6 +43,9 @@ _EXPERIMENTS = {
         "repeat the first poses at the end, near and far: a lens that was touched scales the"
         " picture at every distance alike"
     ),
+    frozenset({"exposure_bias", "focus_breathing"}): (
+        "the same poses at two exposures: only the marks' bias changes with it"
+    ),
     frozenset({"base_drift", "board_slip"}): (
         "repeat the first poses at the end and midway: a slip happens once, a drift goes on"
     ),

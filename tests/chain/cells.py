@@ -40,6 +40,7 @@ def cell(mount: Mount = "eye_in_hand", frames: int = 12, seed: int = 3) -> tuple
         joint_velocity_rad_s=rng.uniform(-0.5, 0.5, (frames, 6)),
         approach_joints_rad=joints + rng.uniform(-0.1, 0.1, (frames, 6)),
         t_s=np.linspace(0.0, 1800.0, frames),
+        exposure_s=rng.uniform(0.004, 0.02, frames),
         temperature_c=np.linspace(21.0, 33.0, frames),
         robot_model=ARM,
         payload_kg=1.2,

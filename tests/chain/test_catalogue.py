@@ -14,7 +14,20 @@ from calib.views import Mount, Views
 from tests.chain.cells import cell
 
 LABELS = [effect.label for effect in catalogue()]
-UNITS = {"1", "m", "rad", "s", "px", "px m^2", "frame", "m/rad^2", "px/g", "rad/g", "rad/Nm"}
+UNITS = {
+    "1",
+    "m",
+    "rad",
+    "s",
+    "px",
+    "px m^2",
+    "frame",
+    "m/rad^2",
+    "px/g",
+    "px/s",
+    "rad/g",
+    "rad/Nm",
+}
 SUFFIXES = {"m": "_m", "rad": "_rad", "s": "_s", "px m^2": "_px_m2", "m/rad^2": "_m_rad2"}
 MUST_HAVE = {
     *("pose_time_lag", "joint_zero_offset", "link_geometry", "joint_compliance"),
@@ -22,7 +35,14 @@ MUST_HAVE = {
     *("board_warp", "board_scale", "board_shear", "board_slip", "focus_breathing"),
     *("focus_hysteresis", "thermal_focal_drift", "decentering", "higher_order_radial"),
     *("distance_dependent_distortion", "entrance_pupil_shift", "protective_window", "lens_sag"),
-    *("sensor_tilt", "rolling_shutter", "optics_step", "base_compliance", "base_drift"),
+    *(
+        "sensor_tilt",
+        "rolling_shutter",
+        "optics_step",
+        "base_compliance",
+        "base_drift",
+        "exposure_bias",
+    ),
 }
 
 
@@ -115,6 +135,9 @@ def test_what_an_effect_needs_is_missed_where_it_was_not_logged(label: str) -> N
         value = getattr(views, column)
         bare = replace(views, **{column: np.full_like(value, np.nan)})
         assert column in str(effect.missing(bare))
+    for column in effect.needs_variation:
+        same = np.full_like(getattr(views, column), 0.01)
+        assert "same in every frame" in str(effect.missing(replace(views, **{column: same})))
     if effect.moving_only:
         assert "moved" in str(effect.missing(replace(views, moving=False)))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -28,7 +29,11 @@ EFFECTS = {effect.label: effect for effect in catalogue()}
 
 
 def log_for(effect: Effect) -> Views:
-    return log(FRAMES, moving=effect.moving_only)
+    views = log(FRAMES, moving=effect.moving_only)
+    if effect.needs_variation:
+        exposure_s = np.random.default_rng(4).choice([0.004, 0.008, 0.012, 0.02], len(views))
+        views = replace(views, exposure_s=exposure_s)
+    return views
 
 
 def truth(effect: Effect) -> Present:

@@ -62,6 +62,7 @@ def make(frames: int = 24, seed: int = 7) -> MadeUp:
         approach_joints_rad=rng.uniform(-2, 2, (frames, 6)),
         joint_velocity_rad_s=np.abs(rng.normal(0, 0.2, (frames, 6))),
         t_s=6.5 * np.arange(frames),
+        exposure_s=0.004 + 0.004 * (np.arange(frames) % 4),
         robot_model="ur5e",
     )
     return MadeUp(views, poses, rng)

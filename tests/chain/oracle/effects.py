@@ -290,6 +290,17 @@ def _(p: Numbers, scene: Scene) -> None:
     _add(scene, "tilt_y_rad", p["tilt_y_rad"])
 
 
+@_of("exposure_bias")
+def _(p: Numbers, scene: Scene) -> None:
+    middle = anp.mean(scene.points, axis=0)
+    pose, sidewards = scene.pose(), scene.points - middle
+    farthest_m = anp.sqrt(anp.max(anp.sum(sidewards**2, axis=1)))
+    farthest_px = scene.optics["alpha_px"] * farthest_m / scene.depth(pose)
+    share = p["px_per_s"] * (scene.logged("exposure_s") - p["at_exposure_s"]) / farthest_px
+    centre = formulas.swept_pixel(scene.optics, formulas.camera_coordinates(pose, middle))
+    scene.found_at = lambda pixels: pixels + share * (pixels - centre)
+
+
 @_of("rolling_shutter")
 def _(p: Numbers, scene: Scene) -> None:
     speed = scene.board_speed()

@@ -13,7 +13,7 @@ from tests.chain.oracle.formulas import Array
 
 DOWN = np.array([0.0, 0.0, -1.0])
 _MOMENT_S = 1e-4
-ORDER = ("clock", "arm", "mount", "board", "lens", "sensor")
+ORDER = ("clock", "arm", "mount", "board", "lens", "sensor", "detector")
 
 
 class Scene:
@@ -21,7 +21,8 @@ class Scene:
 
     `base` is where the arm's base stands against where it was taken to stand, `dh` are the arm's
     nominal rows, `flange`, `mounted` and `fixed` (4, 4) transforms as in a cell model, `optics` its
-    columns by name; `focused_before` is the frame before's distance.
+    columns by name; `focused_before` is the frame before's distance;
+    `found_at` says where the detector finds (C, 2) pixels.
     """
 
     def __init__(self, views: Views, frame: int, dh: FloatArray, optics: dict[str, Array]) -> None:
@@ -36,6 +37,7 @@ class Scene:
         self.fixed: Array = np.eye(4)
         self.points: Array = views.board.corners_m
         self.optics = optics
+        self.found_at: Callable[[Array], Array] = lambda pixels: pixels
         self.focused_before: Callable[[], Array] = lambda: self.focused
 
     def logged(self, column: str) -> float:
@@ -112,4 +114,4 @@ def pixels(scene: Scene, corners: Sequence[int]) -> Array:
     """(C, 2) of those corners."""
     pose = scene.pose()
     seen = anp.dot(scene.points[list(corners)], anp.transpose(pose[:3, :3])) + pose[:3, 3]
-    return anp.transpose(formulas.swept_pixel(scene.optics, anp.transpose(seen)))
+    return scene.found_at(anp.transpose(formulas.swept_pixel(scene.optics, anp.transpose(seen))))

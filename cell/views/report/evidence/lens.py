@@ -62,6 +62,18 @@ def by_focus_direction(data: ReportData, effect: Mapping[str, Any]) -> Figure | 
     return figure
 
 
+def by_exposure(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
+    """Depth error against the exposure."""
+    shifts, exposure_ms = shifts_m(data, effect), data.views.exposure_s * 1e3
+    if shifts is None or not np.isfinite(exposure_ms).any():
+        return None
+    figure, axes = panels(6.0, 3.2)
+    _depth(axes[0], shifts, exposure_ms)
+    axes[0].set_xlabel("exposure (ms)")
+    legend_below(figure, axes)
+    return figure
+
+
 def _alpha(ax: Axes, data: ReportData, effect: Mapping[str, Any], distance: np.ndarray) -> None:
     found = data.evidence
     assert found is not None

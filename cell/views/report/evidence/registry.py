@@ -80,6 +80,14 @@ register(
     ),
 )
 register(
+    "exposure_bias detector",
+    Picture(
+        lens.by_exposure,
+        "The board seems the nearer the longer the exposure before, and at no exposure after.",
+        "the exposure of each frame, its camera pose by its picture and by the robot",
+    ),
+)
+register(
     "decentering higher_order_radial sensor_tilt sensor",
     Picture(
         image.before_and_after,

@@ -37,8 +37,10 @@ def _box(data: ReportData, link: str, role: str) -> str:
 
 
 def _state(data: ReportData, link: str) -> tuple[str, str, str]:
-    if data.diagnosis is None or link == "detector":
-        return "untested", "·", _detector(data) if link == "detector" else "not diagnosed"
+    if link == "detector" and not _effects(data, link):
+        return "untested", "·", _detector(data)
+    if data.diagnosis is None:
+        return "untested", "·", "not diagnosed"
     unexplained = data.diagnosis.get("unexplained") or {}
     if unexplained.get("link") == link:
         return "bad", "✗", "something unexplained"
