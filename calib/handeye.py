@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from calib.chain.rigid import from_vector, inverse
@@ -250,6 +249,8 @@ def _refine(
     problem: _Problem, X: FloatArray, Z: FloatArray, used: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Weighted least squares from (X, Z); the last result is every frame's distance in sigma."""
+    from scipy.optimize import least_squares  # many a verb never needs it
+
     covariance = np.full((12, 12), np.nan)
     for _ in range(3):
         scale = problem.scales(problem.residuals(X, Z)[used])

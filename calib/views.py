@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+
+from calib.mount import Mount as Mount
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import RigidTransform
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-Mount = Literal["eye_in_hand", "eye_to_hand"]
 
 
 @dataclass(frozen=True)
@@ -174,9 +177,7 @@ class Views:
         columns: dict[str, Any] = {"corners_px": corners}
         if base_from_flange is not None:
             given = base_from_flange
-            logged["base_from_flange"] = (
-                given.as_matrix() if isinstance(given, RigidTransform) else given
-            )
+            logged["base_from_flange"] = given.as_matrix() if hasattr(given, "as_matrix") else given
         for name, value in logged.items():
             if name not in _PER_FRAME:
                 raise ValueError(f"{name} is not a column; known are {', '.join(_PER_FRAME)}")

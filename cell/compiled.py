@@ -65,14 +65,17 @@ def forget_stale() -> None:
     files = (path for room in _ROOMS for path in sorted(room.rglob("*.py")))
     code = {path: text for path in files if b"njit" in (text := path.read_bytes())}
     now = hashlib.sha256(b"".join(code.values())).hexdigest()
+    changed = max(path.stat().st_mtime for path in code)
     for folder in _folders():
         mark = folder / _MARK
         with contextlib.suppress(OSError):
-            if mark.is_file() and mark.read_text(encoding="ascii") == now:
+            marked = mark.is_file()
+            if marked and mark.read_text(encoding="ascii") == now:
                 continue
             folder.mkdir(parents=True, exist_ok=True)
-            for path in code:
-                for kept in folder.rglob(f"{path.stem}.*.nbi"):
+            for kept in (k for path in code for k in folder.rglob(f"{path.stem}.*.nbi")):
+                # without a mark, tests or a program may have compiled what is here now
+                if marked or kept.stat().st_mtime < changed:
                     kept.unlink(missing_ok=True)
             mark.write_text(now, encoding="ascii")
 

@@ -21,10 +21,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
 
 from calib.calibration.held_out import HeldOut, frame_by_frame, judge
 from calib.calibration.quantities import quantities_of
+from calib.distributions import chi2_tail, normal_limit
 from calib.errors import CalibrationError
 from calib.solver.elimination import UNDETERMINED, solve_scaled
 from calib.solver.joint import JointFit, fit_joint
@@ -254,8 +254,8 @@ def _move(name: str, rows: FloatArray, folds: Sequence[_Fold]) -> Move:
         largest_z=float(np.abs(z).max()),
         fold=int(worst),
         factor=float(np.sqrt(square / (k * rank))),
-        p_value=float(chi2.sf(square * (k - 1) / k, rank * (k - 1))),
-        drift_p_value=float(chi2.sf(drift * (k - 1) / k, rank)),
+        p_value=chi2_tail(square * (k - 1) / k, rank * (k - 1)),
+        drift_p_value=chi2_tail(drift * (k - 1) / k, rank),
     )
 
 
@@ -275,7 +275,7 @@ def _pulls(
     names = [name for name, r in quantities.items() for _ in r]
     covariance = _inverse(total)
     sigma = np.sqrt(np.einsum("qi,ij,qj->q", rows, covariance, rows))
-    limit = float(norm.isf(SIGNIFICANT / (2 * len(views) * len(rows))))
+    limit = normal_limit(SIGNIFICANT / (2 * len(views) * len(rows)))
     found = []
     for frame, one in zip(views.frame, marginal, strict=True):
         without = _inverse(total - one[:p, :p])

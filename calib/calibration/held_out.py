@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from calib.chain.model import CellModel, kinematics_of
+from calib.distributions import chi2_limit
 from calib.solver.each_frame import EachFrame, each_frame
 from calib.solver.elimination import solve_scaled
 from calib.solver.joint import JointFit, fit_joint
@@ -45,7 +45,7 @@ class ChiSquare:
     @property
     def band(self) -> tuple[float, float]:
         """Where `each` lies 99 times in a hundred, or more often, if it is."""
-        low, high = (float(chi2.ppf(q, self.freedom)) for q in (_BAND, 1.0 - _BAND))
+        low, high = (chi2_limit(tail, self.freedom) for tail in (1.0 - _BAND, _BAND))
         return low / self.freedom, high / self.freedom
 
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from calib.chain.effect import Present
 from calib.chain.model import kinematics_of, walk
@@ -31,6 +30,7 @@ from calib.discovery.scatter import scattered
 from calib.discovery.search import Search
 from calib.discovery.split import split_misfit
 from calib.discovery.start import Fitter, fit_start
+from calib.distributions import chi2_tail
 from calib.solver.joint import JointFit, walked
 from calib.solver.noise import Noise, profile
 from calib.views import BoolArray, Views
@@ -196,7 +196,7 @@ def _named(fits: _Fits, held: Views, fitter: Fitter) -> tuple[NamedEffect, ...]:
                 physics=effect.physics,
                 remedy=effect.remedy,
                 parameters=_values(fits.twin, index),
-                p_value=float(chi2.sf(max(gain, 0.0), max(columns, 1))),
+                p_value=chi2_tail(gain, max(columns, 1)),
                 holdout_gain_px=lost,
             )
         )

@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import f as f_distribution
 
 from calib.chain.effect import Link, Present
 from calib.chain.projection import project_with_jacobians
 from calib.discovery.score import Score, extended
+from calib.distributions import f_tail
 from calib.solver.joint import JointFit
 from calib.solver.unknowns import Dependence
 from calib.views import FloatArray, Views
@@ -166,7 +166,7 @@ class _Test:
         gain, rank = float(along @ along), int(kept.sum())
         freedom = max(2 * int((self.weight > 0).sum()) - 6 * n - rank, 4)
         noise = max((float(self.residual @ self.residual) - gain) / freedom, 1e-12)
-        p = float(f_distribution.sf(gain / noise / rank, rank, freedom))
+        p = f_tail(gain / noise / rank, rank, freedom)
         step = vt[kept].T @ (along / s[kept])
         return Score(gain / noise, rank, p, step)
 

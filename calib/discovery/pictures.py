@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from calib.views import FloatArray
 
@@ -46,6 +45,8 @@ def fit_blur(blur_px: FloatArray, distance_m: FloatArray) -> BlurCurve | None:
 
     Source: thin-lens circle of confusion, proportional to |1/d - 1/focus| (Pentland 1987).
     """
+    from scipy.optimize import least_squares  # many a verb never needs it
+
     known = np.isfinite(blur_px) & np.isfinite(distance_m) & (distance_m > 0.0)
     if known.sum() < _FEWEST:
         return None

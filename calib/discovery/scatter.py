@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from calib.discovery.locate import Cell
 from calib.discovery.residual_structure import ResidualStructure, is_shape_of_law
 from calib.discovery.score import Score
+from calib.distributions import chi2_tail
 
 _WORTH = 30.0
 """A scatter must lower -2 log likelihood by this much; where there is none it is 3 at most."""
@@ -51,7 +51,7 @@ def scattered(leftover: ResidualStructure) -> Scatter | None:
     relative = tried.noise.focal
     if gain < _WORTH or float(np.median(np.abs(tried.own_error[:, 6]))) < _WIDESPREAD * relative:
         return None
-    score = Score(gain, 1, float(0.5 * chi2.sf(gain, 1)), np.array([relative]))
+    score = Score(gain, 1, 0.5 * chi2_tail(gain, 1), np.array([relative]))
     where = f"each frame by itself, {relative:.2g} of it RMS"
     cell = Cell("focal_length", "lens", "chance", score, 1, None, where)
     return None if is_shape_of_law(cell, search) else Scatter(relative, cell)

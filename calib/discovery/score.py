@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
 
 from calib.chain.effect import Present
 from calib.chain.model import kinematics_of
+from calib.distributions import f_tail
 from calib.solver.elimination import solve_scaled
 from calib.solver.joint import JointFit, assemble, walked
 from calib.solver.noise import JointEquations, scaled
@@ -93,7 +93,7 @@ def group_score(information: FloatArray, score: FloatArray, views: Views, price:
     if columns == 0:
         return Score(0.0, 0, 1.0, step, information, score)
     freedom = max(pose_numbers(views) - columns - 14, 4)
-    p_value = float(f_distribution.sf(gain / columns, columns, freedom))
+    p_value = f_tail(gain / columns, columns, freedom)
     return Score(gain, columns, p_value, step, information, score)
 
 

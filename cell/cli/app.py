@@ -31,6 +31,9 @@ app = typer.Typer(
     help="Calibrate a camera on a robot, and name the physics a plain model leaves out.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    # boxes and colours would read markdown's parser first, longer than all the rest takes
+    rich_markup_mode=None,
+    context_settings={"max_content_width": 110},
 )
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from cell.cli.json_flag import JsonFlag
@@ -62,7 +62,7 @@ def bootstrap(
     name = cell.name.split(".")[0]
     recording = output or new_folder(f"{name}-bootstrap")
     told = LayoutDoubt(
-        1e-3 * mount_mm, float(np.radians(mount_deg)), 1e-3 * fixed_mm, reach_m=1e-3 * reach_mm
+        1e-3 * mount_mm, math.radians(mount_deg), 1e-3 * fixed_mm, reach_m=1e-3 * reach_mm
     )
     task = Bootstrap.of(cell, recording, output or cell.parent, told)
     devices = task.devices(dry_run=dry_run, start_deg=start)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from calib.views import Mount
+from calib.mount import Mount
 from cell.cli.json_flag import JsonFlag
 from cell.errors import InputError
 from cell.storage.files.results import new_folder

@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 
 from calib.chain.effect import Present
 from calib.chain.effects import find_effect, make_effect
-from calib.discovery.design.power import alike, noncentrality, plan_power
+from calib.discovery.design.power import alike, plan_power
+from calib.distributions import noncentrality
 from calib.solver.joint import fit_joint
 from calib.solver.unknowns import unknowns_of
 from cell.cli.app import app

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from calib.chain.effect import Effect, Parameter
 from calib.chain.walk import Walk
@@ -15,6 +14,8 @@ _NODES = 6
 
 
 def _act(values: FloatArray, walk: Walk) -> None:
+    from scipy.interpolate import CubicSpline  # half a second that no other effect needs
+
     near_m, far_m = values[_NODES - 1], values[_NODES]
     at = np.linspace(0.0, 1.0, _NODES)
     curve = CubicSpline(at, np.concatenate([values[: _NODES - 1], [0.0]]), bc_type="natural")

@@ -13,14 +13,13 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2
 
 from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue
 from calib.chain.model import CellModel
 from calib.discovery.ambiguity import experiment
 from calib.discovery.candidates import unseen
+from calib.distributions import noncentrality
 from calib.solver.noise import Noise
 from calib.solver.pose_information import PoseInformation, pose_information, project_out
 from calib.views import FloatArray, Views
@@ -186,7 +185,7 @@ def _effect_power(
     own = projected[np.ix_(mine, mine)]
     unknowns = [found.unknowns[k] for k in found.of(at)]
     typical = np.array([u.typical for u in unknowns])
-    needed = noncentrality(_rank(own), FALSE_ALARM / len(effects))
+    needed = noncentrality(_rank(own), FALSE_ALARM / len(effects), DETECTION)
     limits = tuple(
         Limit(u.name.split(".", 1)[1], u.unit, u.typical, _smallest(own[k, k], needed))
         for k, u in enumerate(unknowns)
@@ -204,12 +203,6 @@ def _rank(information: FloatArray) -> int:
     scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     value = np.linalg.eigvalsh(information * scale[:, None] * scale[None, :])
     return max(int((value > 1e-7).sum()), 1)
-
-
-def noncentrality(columns: int, false_alarm: float, detection: float = DETECTION) -> float:
-    """Noncentrality at which a chi-square test of so many columns detects with that chance."""
-    threshold = chi2.isf(false_alarm, columns)
-    return float(brentq(lambda size: ncx2.sf(threshold, columns, size) - detection, 1e-3, 1e4))
 
 
 def _rivals(

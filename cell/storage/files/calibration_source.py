@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt
-from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.paper.focus_law import LAWS
 from calib.views import FloatArray
@@ -132,6 +131,8 @@ class TransformSource(_Part):
     @property
     def matrix(self) -> FloatArray:
         """(4, 4)."""
+        from scipy.spatial.transform import RigidTransform, Rotation
+
         rotation = Rotation.from_quat(self.q_xyzw)
         return RigidTransform.from_components(self.p_m, rotation).as_matrix()
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from calib.chain.rigid import from_vector, inverse
+from calib.distributions import chi2_tail
 from calib.views import FloatArray
 from cell.verbs.compare.field import Field, aligned_place, differences, field_of, jacobian
 from cell.verbs.compare.side import PLACE, Side
@@ -182,7 +182,7 @@ def _p_value(difference: FloatArray, spread: FloatArray) -> float | None:
     if not telling.any():
         return None
     z = (vectors[:, telling].T @ difference) / size[telling]
-    return float(chi2.sf((z**2).sum(), int(telling.sum())))
+    return chi2_tail(float((z**2).sum()), int(telling.sum()))
 
 
 def _row(

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
-from scipy.stats import qmc
 
 from calib.views import FloatArray
 from cell.devices.planned_camera import PlannedCamera
@@ -41,6 +40,8 @@ def varied(
     hand. Perspective then comes from the near views, and a lens that breathes biases Zhang's fit
     most; a plan to show that, not to calibrate by.
     """
+    from scipy.stats import qmc  # a second's import, for plans only
+
     spread = qmc.Halton(5, seed=seed)
     while True:
         tilt, azimuth, roll, far, corner = spread.random()[0]

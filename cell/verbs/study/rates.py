@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from scipy.stats import binomtest
-
 
 def rate(hits: Sequence[bool]) -> dict[str, Any]:
     """How many of how many, and the exact 95 % interval (Clopper and Pearson 1934)."""
     if not hits:
         return {"hits": 0, "runs": 0, "share": None, "low": None, "high": None}
     count, runs = sum(hits), len(hits)
+    from scipy.stats import binomtest  # a second's import, for studies only
+
     ends = binomtest(count, runs).proportion_ci(0.95)
     return {
         "hits": count,

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2
 
 from calib.chain.rigid import inverse, to_vector
+from calib.distributions import chi2_limit, chi2_tail
 from calib.errors import CalibrationError
 from calib.solver.noise import Noise
 from calib.views import BoolArray, FloatArray, Views
@@ -138,7 +138,7 @@ def judge(old: OldCell, views: Views) -> Judgement:
 
 
 def _p(fewer: Change, more: Change) -> float:
-    return float(chi2.sf(fewer.chi2 - more.chi2, len(more.at) - len(fewer.at)))
+    return chi2_tail(fewer.chi2 - more.chi2, len(more.at) - len(fewer.at))
 
 
 def _clean(
@@ -148,7 +148,7 @@ def _clean(
     wrong: list[int] = []
     noise = old.noise
     weight = views.seen.astype(np.float64)
-    limit = float(chi2.isf(_WRONG_FRAME, 6))
+    limit = chi2_limit(_WRONG_FRAME, 6)
     while True:
         for _ in range(2):
             found = explain(old, views, weight, noise, ("board", "mount", "lens"), board_at)
@@ -186,7 +186,7 @@ def _arm(found: Change, noise: Noise) -> tuple[Noise, float, float]:
     """The arm's scatter; where it is clearly more than it was, the larger one counts."""
     pull = float((found.flange_error @ noise.flange_information * found.flange_error).sum())
     ratio = pull / max(found.absorbed, 1e-9)
-    p_value = float(chi2.sf(pull, max(found.absorbed, 1e-9)))
+    p_value = chi2_tail(pull, max(found.absorbed, 1e-9))
     if p_value >= _ARM_ALARM:
         return noise, float(np.sqrt(ratio)), p_value
     scale = np.sqrt(ratio)

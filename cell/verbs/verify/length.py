@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from calib.chain.model import CellModel, walk
 from calib.chain.projection import project, project_with_jacobians
 from calib.chain.rigid import inverse
+from calib.distributions import normal_tail
 from calib.solver.unknowns import moved
 from calib.views import BoolArray, FloatArray, Views
 from cell.errors import InputError
@@ -95,7 +95,7 @@ def measure(old: OldCell, found: Judgement, misfit: Misfit, known: KnownLength) 
     measured = float(np.linalg.norm(along))
     variance = seen.variance(points, along / measured) + known.sigma_m**2
     error, sigma = measured - known.length_m, float(np.sqrt(variance))
-    p_value = float(2 * norm.sf(abs(error) / sigma))
+    p_value = 2 * normal_tail(abs(error) / sigma)
     return LengthFound(known, int(both.sum()), measured, error, sigma, p_value)
 
 

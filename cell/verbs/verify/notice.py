@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2
 
 from calib.chain.model import predict, walk
 from calib.chain.optics import COLUMN
 from calib.chain.rigid import inverse
+from calib.distributions import noncentrality
 from calib.solver.free_poses import fit_free_poses
 from calib.solver.unknowns import moved
 from calib.views import FloatArray
@@ -61,9 +60,7 @@ def noticeable(old: OldCell, found: Judgement, misfit: Misfit) -> Noticeable:
 
 def _factor(degrees: int) -> float:
     """How many sigmas a change must be to be noticed with probability `POWER`."""
-    limit = float(chi2.isf(SIGNIFICANT, degrees))
-    far = brentq(lambda nc: float(ncx2.sf(limit, degrees, nc)) - POWER, 1e-3, 1e4)
-    return float(np.sqrt(far))
+    return float(np.sqrt(noncentrality(degrees, SIGNIFICANT, POWER)))
 
 
 def _worst(both: Change, at: np.ndarray[tuple[int], np.dtype[np.int64]]) -> float:

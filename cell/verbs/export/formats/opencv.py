@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from cell.verbs.export.camera import Camera
@@ -15,6 +14,8 @@ def text(camera: Camera) -> str:
 
     Pixel coordinates are OpenCV's: (0, 0) at the centre of the top-left pixel.
     """
+    import cv2  # no other format needs it
+
     coefficients = camera.coefficients(LENGTHS, "opencv")
     flags = cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | cv2.FILE_STORAGE_FORMAT_YAML
     storage = cv2.FileStorage("camera.yaml", flags)

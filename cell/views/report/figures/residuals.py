@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import norm
 
 from calib.views import FloatArray, Views
 from cell.views.report.data import ReportData
@@ -77,8 +76,9 @@ def _histogram(ax: Axes, residual: FloatArray) -> None:
         ax.hist(values, edges.tolist(), density=True, histtype="step", color=colour, linestyle=line,
                 linewidth=1.3, label=f"{name}: σ {values.std():.2g} px")  # fmt: skip
     # the middle of the residuals says how wide the bell would be without outliers
-    middle = 1.4826 * float(np.nanmedian(np.abs(residual)))
-    ax.plot(edges, norm.pdf(edges, scale=middle), color="#5b616b", linewidth=1,
+    middle = 1.4826 * float(np.nanmedian(np.abs(residual))) or limit
+    bell = np.exp(-0.5 * (edges / middle) ** 2) / (np.sqrt(2 * np.pi) * middle)
+    ax.plot(edges, bell, color="#5b616b", linewidth=1,
             label=f"normal, robust σ {middle:.2g} px")  # fmt: skip
     ax.set(title="histogram", xlabel="residual (px)", ylabel="density (1/px)")
     ax.set_ylim(top=ax.get_ylim()[1] * 1.35)
