@@ -51,8 +51,9 @@ def _rough_rotations(corners_px: FloatArray, board: Board) -> Rotation:
 def _rough_poses(corners_px: FloatArray, board: Board) -> tuple[Rotation, FloatArray]:
     """camera_from_board rotations of N frames, and (N, 3) where the board's centre is."""
     some = slice(None, None, -(-board.corner_count // _MOST_CORNERS))
-    points = board.corners_m.astype(np.float32)[some]
-    pixels = corners_px[:, some].astype(np.float32)
+    # OpenCV refuses points that do not lie one behind the other in memory
+    points = np.ascontiguousarray(board.corners_m[some], dtype=np.float32)
+    pixels = np.ascontiguousarray(corners_px[:, some], dtype=np.float32)
     extent = float(np.ptp(corners_px.reshape(-1, 2), axis=0).max())
     middle = corners_px.reshape(-1, 2).mean(axis=0)
     K: NDArray[Any] = np.array(
