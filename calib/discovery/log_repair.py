@@ -13,7 +13,7 @@ from calib.chain import rigid
 from calib.discovery.log_consistency.consistency import mounted_from_fixed
 from calib.discovery.log_consistency.conventions import find_conventions
 from calib.discovery.log_consistency.mixup import ROBOT_COLUMNS, Mixup
-from calib.discovery.log_consistency.pairing import find_odd_frames, find_offset
+from calib.discovery.log_consistency.pairing import find_pairing
 from calib.discovery.log_consistency.recover import recover_joints, recover_poses
 from calib.discovery.log_consistency.robot_model import find_robot_model
 from calib.discovery.log_consistency.which_arm import recognise_arm
@@ -94,22 +94,21 @@ def repair_log(views: Views, log: Views) -> LogRepair:
     worked_out = recover_joints(log)
     log, said = worked_out.views, [*said, *worked_out.said]
     views = _rows_of(views, log)
-    for find in (_offset, _robot_model):
-        mixup = find(views, log, loop)
-        if mixup is not None:
-            mixups.append(mixup)
-            views, log = mixup.mend(views, log), mixup.mend(log, log)
-    odd = find_odd_frames(views, loop)
-    if odd.swap is not None:
-        mixups.append(odd.swap)
-        views, log = odd.swap.mend(views, log), odd.swap.mend(log, log)
-    rejected += [Rejection(f, "its pose belongs to no picture") for f in odd.dropped]
+    model = find_robot_model(views, loop)
+    if model is not None:
+        mixups.append(model)
+        views, log = model.mend(views, log), model.mend(log, log)
+    pairing = find_pairing(views, log, loop)
+    for mixup in pairing.mixups:
+        mixups.append(mixup)
+        views, log = mixup.mend(views, log), mixup.mend(log, log)
+    rejected += [Rejection(f, "its pose belongs to no picture") for f in pairing.dropped]
     rejected += [
         Rejection(int(f), "no flange pose")
         for f, has in zip(views.frame, views.has_pose, strict=True)
         if not has
     ]
-    kept = good & views.has_pose & ~np.isin(views.frame, odd.dropped)
+    kept = good & views.has_pose & ~np.isin(views.frame, pairing.dropped)
     if kept.sum() < FEWEST_FRAMES:
         raise CalibrationError(
             f"only {int(kept.sum())} frames have a board and a flange pose that belong together;"
@@ -123,14 +122,6 @@ def _rows_of(views: Views, log: Views) -> Views:
     where = {int(frame): k for k, frame in enumerate(log.frame)}
     row = np.array([where[int(frame)] for frame in views.frame])
     return replace(views, **{name: getattr(log, name)[row] for name in ROBOT_COLUMNS})
-
-
-def _offset(views: Views, log: Views, loop: FloatArray) -> Mixup | None:
-    return find_offset(views, log, loop)
-
-
-def _robot_model(views: Views, log: Views, loop: FloatArray) -> Mixup | None:
-    return find_robot_model(views, loop)
 
 
 def _mend_conventions(

@@ -43,7 +43,8 @@ def shuffled(board, corners, turns):
 
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
 @pytest.mark.parametrize(
-    ("rows", "cols", "possible"), [(7, 9, (0, 2)), (6, 6, (0, 1, 2, 3)), (7, 7, (0, 2)), (14, 14, (0, 1, 2, 3))]
+    ("rows", "cols", "possible"),
+    [(7, 9, (0, 2)), (6, 6, (0, 1, 2, 3)), (7, 7, (0, 2)), (14, 14, (0, 1, 2, 3))],
 )
 def test_robot_poses_undo_any_turns(rows, cols, possible, mount):
     board = Board("chessboard", rows, cols, 0.02)

@@ -7,7 +7,7 @@ is one for a log in metres and 0.001 for one in millimetres that says metres.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -39,6 +39,22 @@ class Closure:
     length_factor: float
     angle_rad: FloatArray
     distance_m: FloatArray
+
+    def expected(self, mounted_from_fixed: FloatArray) -> FloatArray:
+        """(N, 4, 4) base_from_flange that the pictures ask for."""
+        asked = rigid.inverse(self.flange_from_mounted @ mounted_from_fixed)
+        return np.asarray(self.base_from_fixed @ asked)
+
+    def judging(self, mounted_from_fixed: FloatArray, base_from_flange: FloatArray) -> Closure:
+        """The same transforms with what these frames miss by."""
+        rx, tx = self.flange_from_mounted[:3, :3], self.flange_from_mounted[:3, 3]
+        rz, tz = self.base_from_fixed[:3, :3], self.base_from_fixed[:3, 3]
+        both = np.isfinite(mounted_from_fixed) & np.isfinite(base_from_flange)
+        known = np.asarray(both.all(axis=(1, 2)))
+        angle = _angles(mounted_from_fixed, base_from_flange, rx, rz, known)
+        miss = _distances(mounted_from_fixed, base_from_flange, rx, tx, tz, self.length_factor)
+        miss[~known] = np.nan
+        return replace(self, angle_rad=angle, distance_m=miss)
 
     @property
     def typical_angle_rad(self) -> float:
