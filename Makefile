@@ -3,13 +3,17 @@ PYTHON ?= $(shell test -x /usr/bin/python3 && /usr/bin/python3 -c 'import sys; s
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# No picture is rendered, no arm driven, no page opened, no whole recording diagnosed
+FAST := tests/chain/test_projection.py tests/chain/test_rigid.py tests/chain/test_walk.py tests/kinematics \
+  tests/paper tests/solver/test_free_poses.py tests/cell/test_files.py tests/cell/test_recording.py \
+  tests/cell/test_session.py tests/cell/test_worker.py tests/docs/test_architecture.py
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help run test lint types layers docs setup clean
+.PHONY: help run test test-fast lint types layers docs setup clean
 setup: $(STAMP)  ## install into .venv
 
 help:  ## this list
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST)
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST)
 
 $(STAMP): pyproject.toml tools/install-debian-packages
 	tools/install-debian-packages
@@ -25,6 +29,9 @@ test: $(STAMP) lint types layers docs  ## lint, types, layers, docs and every te
 	tools/install-debian-packages test
 	tools/install-mrcal
 	$(BIN)/python -m pytest -n 2
+
+test-fast: $(STAMP) lint types layers  ## lint, types, layers, and the tests that take a moment
+	$(BIN)/python -m pytest -n 2 $(FAST)
 
 lint: $(STAMP)  ## ruff, its rules and its format
 	$(BIN)/ruff check .

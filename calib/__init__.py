@@ -1,4 +1,6 @@
-"""Calibration core: the measurement chain, the fits that walk it, and the discovery.
+"""Calibration core: the measurement chain, the fits that evaluate it, and the discovery.
+
+Imports no other package of ours; knows no file, no device and no terminal.
 
 For those who bring their own corners::
 

@@ -1,4 +1,8 @@
-"""The operator's side: command line, plans, sequencer, recording, report."""
+"""The operator's side: command line, plans, sequencer, recording, report.
+
+Six floors, each imports those below and `calib`, `drivers`, `sim`: cli, verbs, views, devices,
+sequencer, storage.
+"""
 
 import os
 

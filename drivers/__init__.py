@@ -1,1 +1,4 @@
-"""Arms and cameras behind two small protocols, one plain class per device."""
+"""Arms and cameras behind two small protocols, one plain class per device.
+
+Imports no other package of ours.
+"""

@@ -1,1 +1,4 @@
-"""The simulated cell: arm and camera in process, and peers that speak real devices' protocols."""
+"""The simulated cell: arm and camera in process, and peers that speak real devices' protocols.
+
+Imports the protocols in `drivers` and the physics in `calib.chain`.
+"""

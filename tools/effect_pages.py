@@ -41,7 +41,7 @@ def _overview() -> str:
         "",
         "Made by `tools/effect_pages.py` from `calib/chain/effects/`. Each is simulated by "
         "`cell simulate --effect`, fitted, and searched for by `cell diagnose`, all three by the "
-        "same few lines. Slips of the log are in [bookkeeping](../log-consistency.md).",
+        "same few lines. Mix-ups in the log are in [log consistency](../log-consistency.md).",
         "",
         "| link | effect | what happens |",
         "|---|---|---|",

@@ -1,4 +1,4 @@
-"""The command line: one file per verb, heavy libraries loaded by the verbs that need them."""
+"""The command line: one file per verb, heavy libraries loaded late; imports verbs and below."""
 
 from cell.cli.app import main
 

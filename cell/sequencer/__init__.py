@@ -1,1 +1,1 @@
-"""The one loop that owns the arm: move, settle, grab, check, log, next."""
+"""The one loop that owns the arm: move, settle, grab, check, log; imports storage only."""
