@@ -157,7 +157,7 @@ def _chain() -> str:
     body = []
     for k, (link, passes) in enumerate(_PASSES.items()):
         x = 10 + 132 * k
-        effects = f"{counts[link]} effects" if link in LINKS and counts[link] else ""
+        effects = f"effects: {counts[link]}" if link in LINKS else ""
         body += [
             _box(x, 20, 108, 66, "#eef3fa"),
             _text(x + 54, 42, link, 15, bold=True),
