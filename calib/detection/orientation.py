@@ -11,6 +11,7 @@ decides each frame on its own.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, cast
 
 import cv2
@@ -197,49 +198,68 @@ def turns_to_agree(
     return np.asarray((chosen - chosen[0]) % 4)
 
 
-def pose_misfits(
-    corners_px: FloatArray,
-    board: Board,
-    readings: Sequence[FloatArray],
-    mount: Mount = "eye_in_hand",
-) -> FloatArray:
-    """(R, 2) how far each reading of the robot's poses is from what the pictures show.
+@dataclass(frozen=True)
+class Closure:
+    """How far poses of a robot are from what the pictures show.
 
-    By how much the frames miss a mount and a board that stand still, after the best ones were
-    solved for: the median angle in radians, and the places' RMS as a share of the way the flange
-    went. The camera's intrinsics are rough, and the poses may be of any unit.
-
-    Parameters
+    Attributes
     ----------
-    corners_px, board, mount:
-        As for `turns_to_agree`, N complete frames.
-    readings:
-        (N, 4, 4) base_from_flange, as each reading of the log has them.
+    angle_rad:
+        Median angle by which the frames miss a mount and a board that stand still.
+    place_share:
+        RMS by which they miss their place, as a share of the way the flange went.
+    length_factor:
+        Units of the poses' lengths in a unit of the board's; negative where the pictures are
+        mirrored, which rotations do not show.
     """
-    turns = possible_turns(board)
-    camera, centre = _rough_poses(corners_px, board)
-    found = []
-    for reading in readings:
-        flange: FloatArray = reading if mount == "eye_in_hand" else inverse(reading)
+
+    angle_rad: float
+    place_share: float
+    length_factor: float
+
+
+@dataclass(frozen=True)
+class RoughPoses:
+    """(N,) camera_from_board rotations under rough intrinsics, and (N, 3) the board's centre."""
+
+    board: Board
+    mount: Mount
+    camera: Rotation
+    centre: FloatArray
+
+    @classmethod
+    def of(cls, corners_px: FloatArray, board: Board, mount: Mount = "eye_in_hand") -> RoughPoses:
+        """From (N, M, 2) complete frames, pixels."""
+        return cls(board, mount, *_rough_poses(corners_px, board))
+
+    def closure(self, base_from_flange: FloatArray) -> Closure:
+        """Against (N, 4, 4) poses in any unit; frames with NaN do not take part.
+
+        The best mount and board are solved for, with the unit of length free. The intrinsics
+        are rough, and so is the answer.
+        """
+        known = np.flatnonzero(np.isfinite(base_from_flange).all(axis=(1, 2)))
+        turns = possible_turns(self.board)
+        camera, centre, flange = self.camera[known], self.centre[known], base_from_flange[known]
+        flange = flange if self.mount == "eye_in_hand" else inverse(flange)
         robot = Rotation.from_matrix(flange[:, :3, :3])
-        one_way = np.zeros(len(corners_px), dtype=np.int64)
+        one_way = np.zeros(len(known), dtype=np.int64)
         chosen = one_way if len(turns) == 1 else _turns_by_robot(robot, camera, turns)
         turned = camera * _quarter(chosen)
         X, W = _mount_and_board(robot, turned)
         angle = float(np.median((W.inv() * robot * X * turned).magnitude()))
-        found.append((angle, _place_misfit(flange, X, centre)))
-    return np.array(found)
+        return Closure(angle, *_place_misfit(flange, X, centre))
 
 
-def _place_misfit(flange: FloatArray, mount: Rotation, centre: FloatArray) -> float:
-    """RMS of F_i (X s c_i + x) - w over the scatter of the flange's places; x, w, s solved for."""
+def _place_misfit(flange: FloatArray, mount: Rotation, centre: FloatArray) -> tuple[float, float]:
+    """RMS of F_i (X s c_i + x) - w over the scatter of the flange's places, and s; all solved."""
     n, R, went = len(flange), flange[:, :3, :3], flange[:, :3, 3]
     scaled = (R @ mount.apply(centre)[:, :, None])[:, :, 0]
     A = np.concatenate([R, -np.tile(np.eye(3), (n, 1, 1)), scaled[:, :, None]], axis=2)
     A, b = A.reshape(3 * n, 7), -went.ravel()
-    left = A @ np.linalg.lstsq(A, b, rcond=None)[0] - b
+    solved = np.linalg.lstsq(A, b, rcond=None)[0]
     way = float(np.linalg.norm(went - went.mean(axis=0)))
-    return float(np.linalg.norm(left)) / max(way, 1e-12)
+    return float(np.linalg.norm(A @ solved - b)) / max(way, 1e-12), float(solved[6])
 
 
 def orient(

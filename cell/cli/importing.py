@@ -9,7 +9,7 @@ import typer
 
 from calib.mount import Mount
 from cell.cli.json_flag import JsonFlag
-from cell.errors import InputError
+from cell.errors import BadAnswer, InputError
 from cell.storage.files.results import new_folder
 from cell.verbs.importing import RotationName, Unit
 from cell.views.terminal.output import say, show
@@ -30,6 +30,10 @@ def import_(
     poses: Annotated[
         Path | None, typer.Option(help="File or folder of the flange's poses.")
     ] = None,
+    joints: Annotated[
+        Path | None,
+        typer.Option(help="File or folder of joint angles; with --robot they make the poses."),
+    ] = None,
     rotation: Annotated[
         RotationName | None, typer.Option(help="How the poses' rotations are written.")
     ] = None,
@@ -41,22 +45,29 @@ def import_(
             help="The poses are flange_from_base; where nothing is said, the pictures are asked.",
         ),
     ] = None,
-    mount: Annotated[Mount, typer.Option(help="Where the camera sits.")] = "eye_in_hand",
+    mount: Annotated[
+        Mount | None, typer.Option(help="Where the camera sits; on the flange without.")
+    ] = None,
     robot: Annotated[str | None, typer.Option(help="The arm's model, such as ur5e.")] = None,
+    time_bound: Annotated[
+        float | None,
+        typer.Option(help="Seconds that a pose may be away from its picture (0.05 without)."),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Turn images and poses of another tool's layout into a recording, corners found."""
+    from cell.verbs.importing.conventions import Said
     from cell.verbs.importing.importer import Described, import_source
     from cell.views.terminal.progress import counted_progress
 
     described = Described(
         board=None if board is None else parse_board(board),
         poses=poses,
-        rotation=rotation,
-        unit=unit,
-        inverted=inverted,
+        joints=joints,
+        said=Said(rotation, unit, inverted),
         mount=mount,
         robot=robot,
+        time_bound_s=time_bound,
     )
     folder = output or new_folder(f"{source.resolve().name}-imported")
     with counted_progress("finding corners") as progress:
@@ -65,8 +76,15 @@ def import_(
         say(f"GUESSED: {guess}")
     for frame, reason in imported.rejected.items():
         say(f"no corners in frame {frame}: {reason}")
-    text = f"{folder}: {imported.frames} frames, the board found in {imported.with_corners}"
+    text = (
+        f"{folder}: {imported.frames} frames, the board found in {imported.with_corners},"
+        f" {imported.with_pose} with a flange pose"
+    )
     show(text, vars(imported), as_json=as_json)
+    if imported.contradicted:
+        raise BadAnswer(
+            "\n".join(f"THE PICTURES SPEAK AGAINST IT: {words}" for words in imported.contradicted)
+        )
 
 
 def parse_board(text: str) -> dict[str, Any]:

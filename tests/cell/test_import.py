@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from calib.chain.kinematics import arm
 from calib.views import FloatArray
 from cell.errors import BadAnswer, InputError
 from cell.storage.recording import read_recording
 from cell.verbs.importing import RotationName
-from cell.verbs.importing.conventions import Convention, conclude
+from cell.verbs.importing.conventions import Candidate, Convention, Said
+from cell.verbs.importing.conventions import conclude as conclude_all
 from cell.verbs.importing.importer import Described, import_source
+from cell.verbs.importing.pairing import Pairing
 from cell.verbs.importing.pose_files import read_poses
+from cell.verbs.importing.raw import RawPose
 
 TURN = Rotation.from_rotvec([0.3, -0.5, 0.9])
 P_M = np.array([0.4, -0.2, 0.6])
@@ -31,6 +35,12 @@ WRITTEN: dict[RotationName, FloatArray] = {
 }
 
 
+def conclude(poses: list[RawPose], rotation: RotationName | None = None) -> Convention:
+    """How poses are understood without pictures to ask."""
+    in_order = Pairing("one by one in their order", tuple(range(len(poses))))
+    return conclude_all([Candidate(poses, in_order)], Said(rotation))[1]
+
+
 def words(values: FloatArray) -> str:
     return " ".join(f"{value:.12g}" for value in values)
 
@@ -42,7 +52,7 @@ def test_poses_mean_what_they_are_said_to_mean(
 ) -> None:
     file = tmp_path / "poses.txt"
     file.write_text(words(np.concatenate([scale * P_M, WRITTEN[rotation]])) + "\n")
-    convention = conclude(read_poses(file), rotation, None)
+    convention = conclude(read_poses(file), rotation)
     assert convention.unit == ("m" if scale == 1.0 else "mm")
     pose = convention.transform(read_poses(file)[0])
     np.testing.assert_allclose(pose.translation, P_M, atol=1e-9)
@@ -67,9 +77,9 @@ def test_matrices_are_found_in_every_kind_of_file(tmp_path: Path, name: str, tex
     (tmp_path / name).write_text(text)
     poses = read_poses(tmp_path / name)
     assert len(poses) == 2
-    convention = conclude(poses, None, None)
+    convention = conclude(poses)
     assert convention.rotation == "matrix"
-    assert len(convention.guessed) == 2
+    assert any("rotations are matrix" in words for words in convention.guessed)
     np.testing.assert_allclose(convention.transform(poses[1]).as_matrix(), MATRIX, atol=1e-9)
 
 
@@ -103,7 +113,7 @@ def test_a_folder_of_one_pose_a_file_in_natural_order(tmp_path: Path) -> None:
 def test_nothing_is_guessed_silently(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "p.txt").write_text(text + "\n")
     with pytest.raises(InputError, match=message):
-        conclude(read_poses(tmp_path / "p.txt"), None, None)
+        conclude(read_poses(tmp_path / "p.txt"))
 
 
 def test_a_matrix_that_is_no_rotation_is_refused(tmp_path: Path) -> None:
@@ -132,13 +142,51 @@ def test_pictures_and_poses_become_a_recording(tmp_path: Path) -> None:
     source = pictures(tmp_path / "source")
     poses = tmp_path / "poses.csv"
     poses.write_text(f"img_6.png,{COMMAS}\n")
-    said = Described(board=BOARD, poses=poses, inverted=True, robot="ur5e")
+    said = Described(board=BOARD, poses=poses, said=Said(inverted=True), robot="ur5e")
     imported = import_source(source, tmp_path / "r", said)
     assert (imported.frames, imported.with_corners) == (2, 2)
     views = read_recording(tmp_path / "r").views()
     assert views.has_pose.tolist() == [False, True]
     np.testing.assert_allclose(views.base_from_flange[1], np.linalg.inv(MATRIX), atol=1e-9)
     assert views.robot_model == "ur5e"
+
+
+def test_hidden_depth_and_pose_files_beside_the_pictures_are_no_pictures(tmp_path: Path) -> None:
+    source = pictures(tmp_path / "source")
+    for number in (5, 6):
+        cv2.imwrite(str(source / f"depth_{number}.png"), np.zeros((9, 9), np.uint16))
+        (source / f"._img_{number}.png").write_bytes(b"resource fork")
+        (source / f"img_{number}.json").write_text(json.dumps({"pose": MATRIX.tolist()}))
+    imported = import_source(source, tmp_path / "r", Described(board=BOARD, poses=source))
+    assert (imported.frames, imported.with_corners, imported.with_pose) == (2, 2, 2)
+    assert any("2 depth or infrared pictures" in words for words in imported.guessed)
+    views = read_recording(tmp_path / "r").views()
+    np.testing.assert_allclose(views.base_from_flange[0], MATRIX, atol=1e-9)
+
+
+def test_pictures_without_poses_say_so(tmp_path: Path) -> None:
+    source = pictures(tmp_path / "source")
+    (source / "poses.csv").write_text("nothing read it")
+    imported = import_source(source, tmp_path / "r", Described(board=BOARD))
+    assert any("no flange poses" in w and "poses.csv" in w for w in imported.guessed)
+
+
+def test_joint_angles_become_poses_by_the_arms_kinematics(tmp_path: Path) -> None:
+    source = pictures(tmp_path / "source")
+    angles = np.array([[0.5, -1.3, -2.2, -0.2, 1.1, 0.3], [0.3, -1.8, -1.7, -0.1, 1.3, 0.2]])
+    ros = ["elbow", "shoulder_lift", "shoulder_pan", "wrist_1", "wrist_2", "wrist_3"]
+    told = {
+        "joint_names": [f"{name}_joint" for name in ros],
+        "joint_values": angles[:, [2, 1, 0, 3, 4, 5]].tolist(),
+    }
+    (tmp_path / "joints.yaml").write_text(json.dumps(told))
+    said = Described(board=BOARD, joints=tmp_path / "joints.yaml", robot="ur3")
+    import_source(source, tmp_path / "r", said)
+    views = read_recording(tmp_path / "r").views()
+    np.testing.assert_allclose(views.base_from_flange, arm("ur3").forward(angles), atol=1e-9)
+    np.testing.assert_allclose(views.joints_rad, angles, atol=1e-12)
+    with pytest.raises(InputError, match="Say --robot MODEL"):
+        import_source(source, tmp_path / "s", Described(board=BOARD, poses=said.joints))
 
 
 def test_pictures_and_poses_that_do_not_match(tmp_path: Path) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,161 +11,168 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.chain.rigid import inverse
-from calib.detection.orientation import pose_misfits
+from calib.detection.orientation import Closure, RoughPoses
 from calib.views import FloatArray, Mount
 from cell.errors import InputError
 from cell.verbs.importing import RotationName
-from cell.verbs.importing.conventions import Convention, Witness, conclude
-from cell.verbs.importing.pose_files import RawPose, read_poses
-from tests.paper.scene import mixed_scene
+from cell.verbs.importing.conventions import (
+    NOTHING_SAID,
+    Candidate,
+    Convention,
+    PictureCheck,
+    Said,
+    conclude,
+)
+from cell.verbs.importing.pairing import apply, pairings
+from cell.verbs.importing.pose_files import flange_series, read_poses, read_series
+from cell.verbs.importing.raw import RawPose
+from tests.cell.pose_layouts import LAYOUTS, picture_names, table
+from tests.paper.scene import BOARD, mixed_scene
 
 FRAMES = 9
+SQUARE_M = BOARD.square_m
 
 
-def _flange(mount: Mount = "eye_in_hand") -> FloatArray:
-    return mixed_scene(
-        2, FRAMES - 2, noise_px=0.3, robot_mm=0.1, mount=mount
-    ).views.base_from_flange
-
-
-FLANGE = _flange()
-P_M, TURNS = FLANGE[:, :3, 3], Rotation.from_matrix(FLANGE[:, :3, :3])
-BACK = inverse(FLANGE)
-
-
-def witness(mount: Mount = "eye_in_hand") -> Witness:
+@cache
+def scene(mount: Mount = "eye_in_hand") -> tuple[FloatArray, RoughPoses]:
     views = mixed_scene(2, FRAMES - 2, noise_px=0.3, robot_mm=0.1, mount=mount).views
-
-    def misfits(readings: Sequence[FloatArray]) -> FloatArray:
-        return pose_misfits(views.corners_px, views.board, readings, mount)
-
-    return misfits
+    return views.base_from_flange, RoughPoses.of(views.corners_px, views.board, mount)
 
 
-def _table(*columns: FloatArray, separator: str = " ", head: str = "", first: str = "") -> str:
-    rows = np.column_stack(columns)
-    lines = [head] if head else []
-    for number, row in enumerate(rows):
-        cells = [first.format(number)] if first else []
-        lines.append(separator.join([*cells, *(f"{value:.10g}" for value in row)]))
-    return "\n".join(lines) + "\n"
+def check(mount: Mount = "eye_in_hand") -> PictureCheck:
+    return scene(mount)[1].closure
 
 
-def _euler(order: str, *, degrees: bool = True) -> FloatArray:
-    return np.asarray(TURNS.as_euler(order, degrees=degrees))
+FLANGE = scene()[0]
+P_M, TURNS = FLANGE[:, :3, 3], Rotation.from_matrix(FLANGE[:, :3, :3])
+XYZW = TURNS.as_quat()
 
 
-XYZW, WXYZ = TURNS.as_quat(), TURNS.as_quat(scalar_first=True)
-LAYOUTS: dict[str, tuple[str, str, RotationName]] = {
-    "ROS, x y z w": ("p.txt", _table(P_M, XYZW), "quat_xyzw"),
-    "ABB, mm and w x y z": ("p.csv", _table(1e3 * P_M, WXYZ, separator=","), "quat_wxyz"),
-    "UR, rotation vector": ("p.txt", _table(P_M, TURNS.as_rotvec()), "rotvec"),
-    "rotation vector in degrees": (
-        "p.csv", _table(1e3 * P_M, TURNS.as_rotvec(degrees=True), separator=";"), "rotvec_deg"),
-    "Fanuc, mm and w p r": (
-        "p.csv", _table(1e3 * P_M, _euler("xyz"), separator=",", head="x,y,z,w,p,r"), "rpy_deg"),
-    "roll pitch yaw, radians": ("p.txt", _table(P_M, _euler("xyz", degrees=False)), "rpy"),
-    "KUKA, a b c": (
-        "p.csv", _table(1e3 * P_M, _euler("ZYX"), separator=",", head="X,Y,Z,A,B,C"),
-        "euler_zyx_deg"),
-    "KUKA, nothing named": ("p.txt", _table(1e3 * P_M, _euler("ZYX")), "euler_zyx_deg"),
-    "Staubli": ("p.txt", _table(1e3 * P_M, _euler("XYZ")), "euler_xyz_deg"),
-    "Kawasaki": ("p.txt", _table(1e3 * P_M, _euler("ZYZ")), "euler_zyz_deg"),
-    "TUM, time and x y z w": (
-        "p.txt", "# stamp tx ty tz qx qy qz qw\n" + _table(0.1 + np.arange(FRAMES), P_M, XYZW),
-        "quat_xyzw"),
-    "columns by name, quaternion first": (
-        "p.csv",
-        _table(WXYZ, P_M, separator=",", head="image,qw,qx,qy,qz,tx,ty,tz", first="im_{}.png"),
-        "quat_xyzw"),
-    "columns by name, joints among them": (
-        "p.csv",
-        _table(np.zeros((FRAMES, 6)), 1e3 * P_M, _euler("xyz"), separator=",",
-               head="j1,j2,j3,j4,j5,j6,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg"),
-        "rpy_deg"),
-    "4x4, a row each line": (
-        "p.txt", "\n\n".join(_table(matrix) for matrix in FLANGE), "matrix"),
-    "4x4, one line, by columns": (
-        "p.txt", _table(FLANGE.swapaxes(1, 2).reshape(FRAMES, 16)), "matrix_by_columns"),
-    "3x4 under keys": (
-        "p.json", json.dumps({f"im_{k}.png": m[:3].tolist() for k, m in enumerate(FLANGE)}),
-        "matrix"),
-    "ROS message": (
-        "p.json",
-        json.dumps([
-            {"position": dict(zip("xyz", p.tolist(), strict=True)),
-             "orientation": dict(zip("xyzw", q.tolist(), strict=True))}
-            for p, q in zip(P_M, XYZW, strict=True)]),
-        "quat_xyzw"),
-    "translation and 3x3": (
-        "p.yaml",
-        json.dumps([
-            {"id": k, "R": m[:3, :3].tolist(), "t": m[:3, 3].tolist()}
-            for k, m in enumerate(FLANGE)]),
-        "matrix"),
-    "rotation before position": (
-        "p.json",
-        json.dumps([
-            {"file": f"im_{k}.png", "q": q.tolist(), "t": p.tolist()}
-            for k, (p, q) in enumerate(zip(P_M, WXYZ, strict=True))]),
-        "quat_wxyz"),
-}  # fmt: skip
+def read(
+    path: Path,
+    pictures: Sequence[str],
+    said: Said = NOTHING_SAID,
+    check: PictureCheck | None = None,
+    square_m: float = SQUARE_M,
+) -> tuple[FloatArray, Convention]:
+    """(P, 4, 4) the pictures' poses out of a pose file, and how it was understood."""
+    candidates = [
+        Candidate(series.poses, pairing, series.notes)
+        for series in flange_series(path, read_series(path))
+        for pairing in pairings(pictures, series.poses)
+    ]
+    chosen, convention = conclude(candidates, said, check, square_m)
+    poses = np.array([convention.transform(pose).as_matrix() for pose in chosen.poses])
+    return apply(chosen.pairing, poses), convention
 
 
-def _poses(folder: Path, name: str, text: str) -> list[RawPose]:
-    (folder / name).write_text(text)
-    return read_poses(folder / name)
-
-
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_a_layout_is_understood_and_told(tmp_path: Path, layout: str) -> None:
-    name, text, rotation = LAYOUTS[layout]
-    poses = _poses(tmp_path, name, text)
-    found = conclude(poses, None, None, None, witness())
-    assert found.rotation == rotation
-    assert not found.inverted
-    read = np.array([found.transform(pose).as_matrix() for pose in poses])
-    np.testing.assert_allclose(read, FLANGE, atol=1e-7)
-    told = " ".join(found.guessed)
-    for words in (f"rotations are {rotation}", "positions are in", "base_from_flange", "bear this"):
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_a_layout_is_understood_and_said_aloud(tmp_path: Path, name: str) -> None:
+    layout = LAYOUTS[name]
+    path = layout.write(tmp_path, FLANGE)
+    said = Said(layout.said.get("rotation"))
+    found, convention = read(path, picture_names(layout, FRAMES), said, check())
+    tolerance = 1e-3 * layout.digits_mm
+    np.testing.assert_allclose(found[:, :3, 3], FLANGE[:, :3, 3], atol=tolerance)
+    np.testing.assert_allclose(found[:, :3, :3], FLANGE[:, :3, :3], atol=3e-6)
+    told = " ".join(convention.guessed)
+    for words in ("positions are in", "are paired", "bear this out"):
         assert words in told
+    assert not convention.contradicted
 
 
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
 @pytest.mark.parametrize("write", ["quaternions", "matrices"])
 def test_poses_the_other_way_round_are_found_out(tmp_path: Path, mount: Mount, write: str) -> None:
-    flange = _flange(mount)
+    flange = scene(mount)[0]
     back = inverse(flange)
-    text = _table(back.reshape(FRAMES, 16))
+    text = table(back.reshape(FRAMES, 16))
     if write == "quaternions":
-        text = _table(back[:, :3, 3], Rotation.from_matrix(back[:, :3, :3]).as_quat())
-    poses = _poses(tmp_path, "p.txt", text)
-    found = conclude(poses, None, None, None, witness(mount))
-    assert found.inverted
-    np.testing.assert_allclose(found.transform(poses[0]).as_matrix(), flange[0], atol=1e-7)
+        text = table(back[:, :3, 3], Rotation.from_matrix(back[:, :3, :3]).as_quat())
+    (tmp_path / "p.txt").write_text(text)
+    pictures = [f"{n}.png" for n in range(FRAMES)]
+    found, convention = read(tmp_path / "p.txt", pictures, check=check(mount))
+    assert convention.inverted
+    np.testing.assert_allclose(found, flange, atol=1e-7)
 
 
-def test_what_is_said_wrongly_is_contradicted_aloud(tmp_path: Path) -> None:
-    poses = _poses(tmp_path, "p.txt", _table(P_M, XYZW))
-    found = conclude(poses, "quat_wxyz", "m", False, witness())
-    assert any("THE PICTURES SPEAK AGAINST IT" in words for words in found.guessed)
+def concluded(tmp_path: Path, text: str, said: Said = NOTHING_SAID, **more: float) -> Convention:
+    """How rows of poses, in the pictures' order, are understood."""
+    (tmp_path / "p.txt").write_text(text)
+    pictures = [f"{n}.png" for n in range(FRAMES)]
+    return read(tmp_path / "p.txt", pictures, said, check(), **more)[1]
+
+
+def test_what_is_said_wrongly_is_taken_and_contradicted(tmp_path: Path) -> None:
+    text = table(P_M, XYZW)
+    found = concluded(tmp_path, text, Said("quat_wxyz", "m", False))
+    assert found.rotation == "quat_wxyz"
+    assert any("agree with the pictures only to" in words for words in found.contradicted)
+    found = concluded(tmp_path, text, Said("quat_wxyz"))
+    assert found.contradicted
 
 
 def test_poses_of_other_pictures_are_refused(tmp_path: Path) -> None:
-    poses = _poses(tmp_path, "p.txt", _table(P_M[::-1], XYZW[::-1]))
     with pytest.raises(InputError, match="check the poses and which picture each is of"):
-        conclude(poses, None, None, None, witness())
+        concluded(tmp_path, table(P_M[::-1], XYZW[::-1]))
+
+
+@pytest.mark.parametrize(("typed", "fits"), [(25.0, "0.025"), (0.018, "0.025"), (0.0025, "0.025")])
+def test_a_square_that_contradicts_the_poses_is_refused_with_the_one_that_fits(
+    tmp_path: Path, typed: float, fits: str
+) -> None:
+    (tmp_path / "p.txt").write_text(table(P_M, XYZW))
+    rough = scene()[1]
+
+    def typed_check(poses: FloatArray) -> Closure:
+        """As the pictures of a board of other squares would close: depths grow with them."""
+        found = rough.closure(poses)
+        factor = found.length_factor * SQUARE_M / typed
+        return Closure(found.angle_rad, found.place_share, factor)
+
+    pictures = [f"{n}.png" for n in range(FRAMES)]
+    if 0.6 < SQUARE_M / typed < 1.5:
+        _, convention = read(tmp_path / "p.txt", pictures, Said(), typed_check, typed)
+        assert any(f"squares of {fits}" in words for words in convention.contradicted)
+        return
+    with pytest.raises(InputError, match=f"squares of {fits[:5]}"):
+        read(tmp_path / "p.txt", pictures, Said(), typed_check, typed)
+
+
+def test_a_unit_said_wrongly_is_contradicted(tmp_path: Path) -> None:
+    found = concluded(tmp_path, table(P_M, XYZW), Said(unit="mm"))
+    assert found.unit == "mm"
+    assert any("by a factor of" in words for words in found.contradicted)
+
+
+def test_mirrored_pictures_are_refused_as_such(tmp_path: Path) -> None:
+    views = mixed_scene(2, FRAMES - 2, noise_px=0.3, robot_mm=0.1).views
+    mirrored = views.corners_px.reshape(FRAMES, BOARD.rows, BOARD.cols, 2)[:, :, ::-1].copy()
+    mirrored[..., 0] = views.width_px - 1 - mirrored[..., 0]
+    rough = RoughPoses.of(mirrored.reshape(FRAMES, -1, 2), BOARD)
+    (tmp_path / "p.txt").write_text(table(P_M, XYZW))
+    pictures = [f"{n}.png" for n in range(FRAMES)]
+    with pytest.raises(InputError, match="the pictures are mirrored"):
+        read(tmp_path / "p.txt", pictures, check=rough.closure)
 
 
 def test_pictures_that_cannot_tell_leave_the_question_to_the_user(tmp_path: Path) -> None:
     still = np.repeat(TURNS[:1].as_rotvec(), FRAMES, axis=0)
-    poses = _poses(tmp_path, "p.txt", _table(P_M, still))
+    (tmp_path / "p.txt").write_text(table(P_M, still))
 
-    def no_turn(readings: Sequence[FloatArray]) -> FloatArray:
-        return np.zeros((len(readings), 2))
+    def no_turn(poses: FloatArray) -> Closure:
+        return Closure(0.0, 0.0, 1.0)
 
     with pytest.raises(InputError, match="nothing tells which"):
-        conclude(poses, None, None, None, no_turn)
+        read(tmp_path / "p.txt", [f"{n}.png" for n in range(FRAMES)], check=no_turn)
+
+
+def test_poses_too_far_in_time_are_refused(tmp_path: Path) -> None:
+    layout = LAYOUTS["timestamps around the pictures'"]
+    path = layout.write(tmp_path, FLANGE)
+    poses = flange_series(path, read_series(path))[0].poses
+    with pytest.raises(InputError, match="no pose is near enough in time"):
+        pairings(picture_names(layout, FRAMES), poses, 1e-4)
 
 
 BROKEN: dict[str, Callable[[], tuple[str, str]]] = {
@@ -173,18 +180,25 @@ BROKEN: dict[str, Callable[[], tuple[str, str]]] = {
     "lacks numbers": lambda: ("p.csv", "x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n1,2,3,0,0,,1\n"),
     "cannot be read": lambda: ("p.json", "{"),
     "holds no pose": lambda: ("p.yaml", "[]\n"),
-}
+    "these are joint angles|holds no pose of the flange": lambda: (
+        "p.yaml", "joint_names: [a, b, c, d, e, f]\njoint_values:\n  - [0, 1, 2, 3, 4, 5]\n"),
+    "no whole OpenCV FileStorage": lambda: (
+        "p.yaml", "%YAML:1.0\n---\nT: !!opencv-matrix\n   rows: 4\n   cols: 4\n   data: [ 1"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("message", BROKEN)
 def test_a_broken_file_is_refused_with_its_place(tmp_path: Path, message: str) -> None:
     name, text = BROKEN[message]()
+    (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=message):
-        _poses(tmp_path, name, text)
+        read_poses(tmp_path / name)
 
 
 def test_a_convention_reads_what_it_says() -> None:
     pose = RigidTransform.from_components(P_M[0], TURNS[0])
     raw = RawPose("here", None, np.concatenate([P_M[0], TURNS[0].as_euler("ZYZ", degrees=True)]))
-    read = Convention("euler_zyz_deg", "m").transform(raw)
-    np.testing.assert_allclose(read.as_matrix(), pose.as_matrix(), atol=1e-9)
+    rotation: RotationName = "euler_zyz_deg"
+    np.testing.assert_allclose(
+        Convention(rotation, "m").transform(raw).as_matrix(), pose.as_matrix(), atol=1e-9
+    )

@@ -18,4 +18,4 @@ RotationName = Literal[
     "euler_zyz",
     "euler_zyz_deg",
 ]
-Unit = Literal["m", "mm"]
+Unit = Literal["m", "mm", "cm", "in"]

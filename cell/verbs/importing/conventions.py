@@ -6,44 +6,56 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
-from calib.chain.rigid import inverse
+from calib.detection.orientation import Closure
 from calib.views import FloatArray
 from cell.errors import InputError
 from cell.verbs.importing import RotationName, Unit
-from cell.verbs.importing.pose_files import RawPose
+from cell.verbs.importing.lengths import Lengths, unit_of
+from cell.verbs.importing.pairing import Pairing, apply
+from cell.verbs.importing.raw import RawPose
+from cell.verbs.importing.rotations import (
+    METRES,
+    QUATERNIONS,
+    THREE_ANGLES,
+    is_unit,
+    read_matrices,
+    read_pose,
+)
 
-Witness = Callable[[Sequence[FloatArray]], FloatArray]
-"""(R, 2) how far off each reading (N, 4, 4) of all poses is by the pictures: radians, share."""
+PictureCheck = Callable[[FloatArray], Closure | None]
+"""How far (P, 4, 4) poses, one a picture or NaN, are from what the pictures show."""
 
-_FARTHEST_M = 4.0
-"""No arm this program knows reaches farther; larger numbers are millimetres."""
-
-_GOOD = np.array([0.06, 0.3])
-"""Radians, and share of the flange's way, that rough intrinsics and a poor arm may make: a wrong
-reading is off by half the way and more."""
+_GOOD_RAD, _GOOD_SHARE = 0.06, 0.3
+"""What rough intrinsics and a poor arm may make: a wrong reading is off by half the way and more,
+a right one by a few percent."""
 
 _TELLS_APART = 3.0
 """A reading counts as decided when the next best is so many times worse."""
 
 _LEAST = 0.005
 
-_READ: dict[RotationName, tuple[int, Callable[[FloatArray], Rotation]]] = {
-    "quat_xyzw": (4, Rotation.from_quat),
-    "quat_wxyz": (4, lambda q: Rotation.from_quat(np.roll(q, -1))),
-    "rotvec": (3, Rotation.from_rotvec),
-    "rotvec_deg": (3, lambda r: Rotation.from_rotvec(r, degrees=True)),
-    "rpy": (3, lambda r: Rotation.from_euler("xyz", r)),
-    "rpy_deg": (3, lambda r: Rotation.from_euler("xyz", r, degrees=True)),
-    "euler_zyx": (3, lambda r: Rotation.from_euler("ZYX", r)),
-    "euler_zyx_deg": (3, lambda r: Rotation.from_euler("ZYX", r, degrees=True)),
-    "euler_xyz": (3, lambda r: Rotation.from_euler("XYZ", r)),
-    "euler_xyz_deg": (3, lambda r: Rotation.from_euler("XYZ", r, degrees=True)),
-    "euler_zyz": (3, lambda r: Rotation.from_euler("ZYZ", r)),
-    "euler_zyz_deg": (3, lambda r: Rotation.from_euler("ZYZ", r, degrees=True)),
-}
-_MATRICES: tuple[RotationName, ...] = ("matrix", "matrix_by_columns")
+
+@dataclass(frozen=True)
+class Said:
+    """What the user said of the poses; None where nothing."""
+
+    rotation: RotationName | None = None
+    unit: Unit | None = None
+    inverted: bool | None = None
+
+
+NOTHING_SAID = Said()
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Poses that may be the flange's, and which picture each would belong to."""
+
+    poses: Sequence[RawPose]
+    pairing: Pairing
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,81 +72,106 @@ class Convention:
         Whether they are flange_from_base.
     guessed:
         What was not said but concluded, each as a sentence to be told aloud.
+    contradicted:
+        What was said and the pictures speak against, each as a sentence.
     """
 
     rotation: RotationName
     unit: Unit
     inverted: bool = False
     guessed: tuple[str, ...] = ()
+    contradicted: tuple[str, ...] = ()
 
     def transform(self, pose: RawPose) -> RigidTransform:
         """base_from_flange; raises `InputError` where the numbers cannot be what they are said."""
-        scale = 1e-3 if self.unit == "mm" else 1.0
         try:
-            turn, p = _read(pose.values, self.rotation)
+            turn, p = read_pose(pose.values, self.rotation)
         except ValueError as fault:
             raise InputError(f"{pose.where}: is no pose as {self.rotation}: {fault}") from None
-        found = RigidTransform.from_components(scale * p, turn)
+        found = RigidTransform.from_components(METRES[self.unit] * p, turn)
         return found.inv() if self.inverted else found
 
 
-def _read(values: FloatArray, rotation: RotationName) -> tuple[Rotation, FloatArray]:
-    if rotation in _MATRICES:
-        rows = values.reshape(-1, 4)
-        if rotation == "matrix_by_columns":
-            rows = (values.reshape(4, 4) if len(values) == 16 else values.reshape(4, 3)).T
-        return _orthonormal(rows[:3, :3]), rows[:3, 3]
-    count, read = _READ[rotation]
-    if len(values) != 3 + count:
-        raise ValueError(f"{rotation} needs {3 + count} numbers")
-    return read(values[3:]), values[:3]
+@dataclass(frozen=True)
+class _Reading:
+    candidate: Candidate
+    rotation: RotationName
+    inverted: bool
+    closure: Closure | None = None
 
+    @property
+    def size(self) -> float:
+        """How bad it is by the pictures."""
+        c = self.closure
+        return np.inf if c is None else float(np.hypot(c.angle_rad, c.place_share))
 
-def _matrix(values: FloatArray, rotation: RotationName) -> FloatArray:
-    turn, p = _read(values, rotation)
-    return np.asarray(RigidTransform.from_components(p, turn).as_matrix())
+    @property
+    def good(self) -> bool:
+        """Whether the pictures bear it out."""
+        c = self.closure
+        return c is not None and c.angle_rad <= _GOOD_RAD and c.place_share <= _GOOD_SHARE
 
-
-def _orthonormal(matrix: FloatArray) -> Rotation:
-    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-2) or np.linalg.det(matrix) < 0:
-        raise ValueError("its 3x3 part is no rotation")
-    return Rotation.from_matrix(matrix)
+    @property
+    def off(self) -> str:
+        """How far off, in words."""
+        assert self.closure is not None
+        angle, share = np.degrees(self.closure.angle_rad), 1e2 * self.closure.place_share
+        return f"{angle:.2f} degrees, places to {share:.1f} % of the way"
 
 
 def conclude(
-    poses: Sequence[RawPose],
-    rotation: RotationName | None,
-    unit: Unit | None,
-    inverted: bool | None = False,
-    witness: Witness | None = None,
-) -> Convention:
-    """The convention of these poses: as said, else what names, numbers or pictures decide.
+    candidates: Sequence[Candidate],
+    said: Said = NOTHING_SAID,
+    check: PictureCheck | None = None,
+    square_m: float | None = None,
+) -> tuple[Candidate, Convention]:
+    """The poses, their pictures and their convention: as said, else what there is decides.
 
     Parameters
     ----------
-    rotation, unit, inverted:
-        As said; None where it was not.
-    witness:
-        What the pictures say of a reading of the rotations; None where they say nothing.
+    candidates:
+        The likeliest first.
+    check:
+        What the pictures say of a reading; None where they say nothing.
+    square_m:
+        The board's square, for a message about lengths that disagree.
 
     Raises
     ------
     InputError
-        Several readings are left; the message names them.
+        Several readings are left, or the pictures bear none of them out; the message names them.
     """
-    readings = (rotation,) if rotation is not None else _possible(poses)
-    ways = (inverted,) if inverted is not None else (False, True)
-    chosen, turned, told = _decide(poses, [(r, w) for r in readings for w in ways], witness)
-    guessed: list[str] = []
-    if rotation is None:
-        guessed.append(f"rotations are {chosen} (say so with --rotation {chosen})")
-    if unit is None:
-        unit, why = _unit(poses, chosen)
-        guessed.append(f"positions are in {unit}, {why} (say so with --unit {unit})")
-    if inverted is None:
-        name, option = _DIRECTION[turned]
+    readings = [
+        _Reading(candidate, rotation, inverted)
+        for candidate in candidates
+        for rotation in ([said.rotation] if said.rotation else possible(candidate.poses))
+        for inverted in ([said.inverted] if said.inverted is not None else [False, True])
+    ]
+    measured = [] if check is None else [_measured(reading, check) for reading in readings]
+    if any(reading.closure is not None for reading in measured):
+        best, notes, against = _by_pictures(measured, said)
+    else:
+        best, notes, against = _by_words(readings), (), ()
+        if check is not None:
+            notes = ("the pictures could not be asked about the poses",)
+    lengths = _lengths(best, said, square_m)
+    guessed = [*best.candidate.notes, f"poses and pictures are paired {best.candidate.pairing.how}"]
+    if said.rotation is None:
+        guessed.append(f"rotations are {best.rotation} (say so with --rotation {best.rotation})")
+    if said.unit is None:
+        guessed.append(
+            f"positions are in {lengths.unit}, {lengths.why} (say so with --unit {lengths.unit})"
+        )
+    if said.inverted is None:
+        name, option = _DIRECTION[best.inverted]
         guessed.append(f"poses are {name} (say so with {option})")
-    return Convention(chosen, unit, turned, (*guessed, *told))
+    return best.candidate, Convention(
+        best.rotation,
+        lengths.unit,
+        best.inverted,
+        (*guessed, *notes),
+        (*against, *lengths.contradicted),
+    )
 
 
 _DIRECTION = {
@@ -143,19 +180,19 @@ _DIRECTION = {
 }
 
 
-def _possible(poses: Sequence[RawPose]) -> tuple[RotationName, ...]:
+def possible(poses: Sequence[RawPose]) -> tuple[RotationName, ...]:
     """What names and numbers allow; at least one."""
     named, width = poses[0].rotations, len(poses[0].values)
     if width >= 12:
         return ("matrix_by_columns",) if _by_columns(poses) else ("matrix",)
     if width == 7:
-        return named or ("quat_xyzw", "quat_wxyz")
-    possible = named or tuple(name for name, (count, _) in _READ.items() if count == 3)
+        return named or tuple(QUATERNIONS)
+    allowed = named or tuple(THREE_ANGLES)
     largest = max(float(np.abs(pose.values[3:]).max()) for pose in poses)
     if largest > 2 * np.pi + 0.01:
-        degrees = tuple(name for name in possible if name.endswith("_deg"))
-        return degrees or possible
-    return possible
+        degrees = tuple(name for name in allowed if name.endswith("_deg"))
+        return degrees or allowed
+    return allowed
 
 
 def _by_columns(poses: Sequence[RawPose]) -> bool:
@@ -166,73 +203,80 @@ def _by_columns(poses: Sequence[RawPose]) -> bool:
     return bool((matrices[:, :3, 3] == 0).all() and (matrices[:, 3, :3] != 0).any())
 
 
-def _decide(
-    poses: Sequence[RawPose],
-    readings: Sequence[tuple[RotationName, bool]],
-    witness: Witness | None,
-) -> tuple[RotationName, bool, tuple[str, ...]]:
-    """Rotation, direction, and what there is to tell of how it was decided."""
-    misfits = _misfits(poses, readings, witness)
-    if misfits is None:
-        rotations = list(dict.fromkeys(rotation for rotation, _ in readings))
-        if len(rotations) > 1:
-            raise InputError(_ask(poses, rotations))
-        told = () if witness is None else ("the pictures could not be asked about the rotations",)
-        return readings[0][0], readings[0][1], told
-    size = np.hypot(misfits[:, 0], misfits[:, 1])
-    order = np.argsort(size, kind="stable")
-    best, least = readings[order[0]], max(float(size[order[0]]), _LEAST)
-    rivals = [readings[k] for k in order[1:] if size[k] < _TELLS_APART * least]
-    angle, share = misfits[order[0]]
-    off = f"{np.degrees(angle):.2f} degrees, places to {1e2 * share:.1f} % of the way"
-    if (misfits[order[0]] > _GOOD).any():
-        if len(readings) == 1:
-            return (*best, (f"BUT THE PICTURES SPEAK AGAINST IT: turns agree only to {off}",))
-        raise InputError(
-            f"{_ask(poses, [r for r, _ in readings])} By the pictures the best of them"
-            f" ({best[0]}) agrees only to {off}: check the poses and which picture each is of."
-        )
-    if any(rival[0] != best[0] for rival in rivals):
-        raise InputError(_ask(poses, [best[0], *(rival[0] for rival in rivals)]))
-    if rivals:
-        return best[0], readings[0][1], ("the pictures do not tell the direction of the poses",)
-    return (*best, (f"the pictures bear this out: robot's and camera's turns agree to {off}",))
-
-
-def _misfits(
-    poses: Sequence[RawPose],
-    readings: Sequence[tuple[RotationName, bool]],
-    witness: Witness | None,
-) -> FloatArray | None:
-    """(R, 2) by the pictures, infinite for what the numbers forbid; None: not known."""
-    if witness is None:
-        return None
-    out = np.full((len(readings), 2), np.inf)
-    for k, (rotation, turned) in enumerate(readings):
-        try:
-            read = np.array([_matrix(pose.values, rotation) for pose in poses])
-        except ValueError:
-            continue
-        (out[k],) = witness([inverse(read) if turned else read])
-    return out if np.isfinite(out).any() else None
-
-
-def _unit(poses: Sequence[RawPose], rotation: RotationName) -> tuple[Unit, str]:
-    if poses[0].unit is not None:
-        return poses[0].unit, "as their names tell"
+def _measured(reading: _Reading, check: PictureCheck) -> _Reading:
     try:
-        farthest = max(float(np.abs(_read(p.values, rotation)[1]).max()) for p in poses)
-    except ValueError:  # told when the poses are read
-        return "m", "as nothing tells otherwise"
+        values = [pose.values for pose in reading.candidate.poses]
+        read = read_matrices(values, reading.rotation, inverted=reading.inverted)
+    except ValueError:
+        return reading
+    closure = check(apply(reading.candidate.pairing, read))
+    return _Reading(reading.candidate, reading.rotation, reading.inverted, closure)
+
+
+def _by_words(readings: Sequence[_Reading]) -> _Reading:
+    """The reading that names and numbers alone decide."""
+    first = readings[0]
+    rotations = list(dict.fromkeys(reading.rotation for reading in readings))
+    if len(rotations) > 1:
+        raise InputError(ask(first.candidate.poses, rotations))
+    ways = list(dict.fromkeys(reading.candidate.pairing.how for reading in readings))
+    if len(ways) > 1 and not first.candidate.pairing.certain:
+        raise InputError(
+            f"{first.candidate.poses[0].where}: poses may belong to the pictures"
+            f" {', or '.join(ways)}, and the pictures do not tell which: name the picture of each"
+            " pose in the pose file"
+        )
+    return first
+
+
+def _by_pictures(
+    measured: Sequence[_Reading], said: Said
+) -> tuple[_Reading, tuple[str, ...], tuple[str, ...]]:
+    """The reading that the pictures bear out, what to tell of it, and what speaks against it."""
+    order = sorted(range(len(measured)), key=lambda k: (measured[k].size, k))
+    smallest = max(measured[order[0]].size, _LEAST)
+    close = [k for k in order if measured[k].size < _TELLS_APART * smallest]
+    best = measured[min(close)]
+    if not measured[order[0]].good:
+        best = measured[order[0]]
+        if said.rotation is not None:
+            return best, (), (f"the poses as said agree with the pictures only to {best.off}",)
+        raise InputError(_contradicted(best, [r.rotation for r in measured]))
+    rivals = [measured[k] for k in close]
+    if any(rival.rotation != best.rotation for rival in rivals):
+        raise InputError(ask(best.candidate.poses, [best.rotation, *(r.rotation for r in rivals)]))
+    notes = (f"the pictures bear this out: robot's and camera's turns agree to {best.off}",)
+    if any(rival.inverted != best.inverted for rival in rivals):
+        notes = ("the pictures do not tell the direction of the poses",)
+    return best, notes, ()
+
+
+def _contradicted(best: _Reading, rotations: Sequence[RotationName]) -> str:
+    where, pairing = best.candidate.poses[0].where, best.candidate.pairing
+    tried = ", ".join(dict.fromkeys(rotations))
     return (
-        "mm" if farthest > _FARTHEST_M else "m",
-        f"as the largest coordinate is {farthest:.4g}",
+        f"{where}: no reading of the poses agrees with the pictures (tried {tried}). The best"
+        f" ({best.rotation}, paired {pairing.how}) agrees only to {best.off}: check the poses and"
+        " which picture each is of; or say --rotation to take them as they are"
     )
 
 
-def _ask(poses: Sequence[RawPose], readings: Sequence[RotationName]) -> str:
+def _lengths(best: _Reading, said: Said, square_m: float | None) -> Lengths:
+    try:
+        values = [pose.values for pose in best.candidate.poses]
+        places = read_matrices(values, best.rotation, inverted=False)[:, :3, 3]
+    except ValueError as fault:
+        raise InputError(
+            f"{best.candidate.poses[0].where}: is no pose as {best.rotation}: {fault}"
+        ) from None
+    factor = best.closure.length_factor if best.good and best.closure is not None else None
+    return unit_of(places, best.candidate.poses[0].unit, said.unit, factor, square_m)
+
+
+def ask(poses: Sequence[RawPose], readings: Sequence[RotationName]) -> str:
+    """The question that is left, with the answers that can be given."""
     where, left = poses[0].where, " or ".join(dict.fromkeys(f"--rotation {r}" for r in readings))
-    if len(poses[0].values) == 7:
+    if len(poses[0].values) == 7 and is_unit(poses[0].values[3:]):
         return (
             f"{where}: a quaternion may be written x y z w or w x y z, and nothing tells which."
             " Say --rotation quat_xyzw (ROS, scipy) or --rotation quat_wxyz (ABB, Eigen)."

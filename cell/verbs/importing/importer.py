@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
-from calib.detection.orientation import pose_misfits
+from calib.detection.orientation import Closure, RoughPoses
 from calib.views import Board, FloatArray, Mount
 from cell.errors import BadAnswer, InputError
 from cell.storage.recording import (
@@ -26,12 +27,23 @@ from cell.storage.recording import (
 )
 from cell.storage.recording.corners import FILE_NAME as DETECTIONS
 from cell.storage.recording.detect import Progress, detect_corners
-from cell.verbs.importing import RotationName, Unit
-from cell.verbs.importing.conventions import Convention, Witness, conclude
-from cell.verbs.importing.pose_files import RawPose, natural, number_in, read_poses
+from cell.verbs.importing.conventions import (
+    Candidate,
+    Convention,
+    PictureCheck,
+    Said,
+    conclude,
+)
+from cell.verbs.importing.joints import as_poses, in_order, radians
+from cell.verbs.importing.pairing import apply, pairings
+from cell.verbs.importing.pose_files import flange_series, read_series
+from cell.verbs.importing.raw import Series
+from cell.verbs.importing.sources import picture_size, pictures_in, pose_files_beside
 
 _ENOUGH_TO_ASK = 4
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".webp")
+_BOTH_MOUNTS = (
+    "{one} OR {other} (say --mount): the pictures look the same either way and cannot tell"
+)
 
 
 @dataclass(frozen=True)
@@ -42,23 +54,27 @@ class Described:
     ----------
     board:
         In the words of `recording.yaml`.
-    poses:
-        File or folder of the poses; None: pictures alone.
+    poses, joints:
+        File or folder of the poses, and of joint angles; None without.
     rotation, unit, inverted:
         How poses are written; `inverted`: they are flange_from_base. None where not said: then
         the pictures are asked.
-    mount, robot, name:
+    mount:
+        Where the camera sits; None where not said: on the flange, and said aloud.
+    robot, name:
         For `recording.yaml`.
+    time_bound_s:
+        How far apart in time a picture and its pose may be.
     """
 
     board: dict[str, Any] | None = None
     poses: Path | None = None
-    rotation: RotationName | None = None
-    unit: Unit | None = None
-    inverted: bool | None = None
-    mount: Mount = "eye_in_hand"
+    joints: Path | None = None
+    said: Said = field(default_factory=Said)
+    mount: Mount | None = None
     robot: str | None = None
     name: str | None = None
+    time_bound_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -67,19 +83,34 @@ class Imported:
 
     Attributes
     ----------
-    folder, frames, with_corners:
-        The recording, its frames, and in how many of them the board was found.
+    folder, frames, with_corners, with_pose:
+        The recording, its frames, in how many of them the board was found, and how many have a
+        flange pose.
     guessed:
         What was concluded and not said.
     rejected:
         Frame number to the reason why it has no corners.
+    contradicted:
+        What was said and the pictures speak against.
     """
 
     folder: Path
     frames: int
     with_corners: int
+    with_pose: int
     guessed: tuple[str, ...]
     rejected: dict[int, str]
+    contradicted: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Posed:
+    """(P, 4, 4) base_from_flange of each picture, (P, 6) joints, NaN without; how it was read."""
+
+    matrices: FloatArray
+    joints_rad: FloatArray
+    convention: Convention
+    guessed: tuple[str, ...]
 
 
 def import_source(
@@ -94,15 +125,12 @@ def import_source(
     BadAnswer
         The board was found in no picture.
     """
-    guessed: tuple[str, ...] = ()
-    corners = None
     if (source / "recording.yaml").exists():
         _copy_recording(read_recording(source), folder)
-    elif source.is_dir():
-        guessed, corners = _import_pictures(source, folder, described, progress)
-    else:
-        raise InputError(f"{source}: is no folder of pictures and no recording")
-    return _find_corners(read_recording(folder), guessed, corners, progress)
+        return _checked(read_recording(folder), None, (), (), progress)
+    if source.is_dir():
+        return _import_pictures(source, folder, described, progress)
+    raise InputError(f"{source}: is no folder of pictures and no recording")
 
 
 def _copy_recording(recording: Recording, folder: Path) -> None:
@@ -119,35 +147,125 @@ def _copy_recording(recording: Recording, folder: Path) -> None:
 
 def _import_pictures(
     source: Path, folder: Path, described: Described, progress: Progress | None
-) -> tuple[tuple[str, ...], Corners | None]:
-    """What was concluded and not said, and the corners where the pictures were asked."""
-    pictures = sorted(
-        (path for path in source.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES), key=natural
-    )
-    if not pictures:
-        raise InputError(f"{source}: has no pictures ({', '.join(IMAGE_SUFFIXES)})")
+) -> Imported:
+    pictures, notes = pictures_in(source)
     if described.board is None:
         raise InputError(
             "the board is not said: give --board ROWSxCOLSxSQUARE in inner corners and metres, such"
             " as --board 6x9x0.025"
         )
-    poses = [] if described.poses is None else read_poses(described.poses)
-    pairs = _pairs(pictures, poses)
+    series = _series(described)
     header = _header(source, pictures, described)
-    convention, corners = None, None
-    if poses:
+    corners, posed = None, None
+    if series:
         corners = _corners_of(source, header, pictures, progress)
-        witness = _witness(pairs, corners, header.board.board(), described.mount)
-        asked = [pose for _, pose in pairs if pose is not None]
-        said = (described.rotation, described.unit, described.inverted)
-        convention = conclude(asked, *said, witness)
-        header = header.model_copy(update={"imported": _told(header, convention)})
+        posed = _posed(series, pictures, corners, header.board.board(), described)
+        header = header.model_copy(update={"imported": _told(header, posed)})
+        notes += posed.guessed
+    else:
+        notes += _no_poses(source)
     with RecordingWriter.create(folder, header) as writer:
-        for frame, (picture, pose) in enumerate(pairs):
+        for frame, picture in enumerate(pictures):
             name = f"images/{frame:05d}{picture.suffix.lower()}"
             shutil.copy2(picture, folder / name)
-            writer.append(_frame(frame, name, picture, pose, convention))
-    return () if convention is None else convention.guessed, corners
+            writer.append(_frame(frame, name, picture, posed))
+    against = () if posed is None else posed.convention.contradicted
+    return _checked(read_recording(folder), corners, notes, against, progress)
+
+
+def _series(described: Described) -> list[Series]:
+    """What can be the flange's poses: as written, or of joint angles through the kinematics."""
+    if described.poses is None and described.joints is None:
+        return []
+    if described.poses is None:
+        assert described.joints is not None
+        found = read_series(described.joints)
+        able = [s for s in found if s.role == "joints"] or _only(found)
+        return [made for series in able for made in as_poses(series, described.robot)]
+    found = read_series(described.poses)
+    if all(series.role == "joints" for series in found):
+        return [made for series in found for made in as_poses(series, described.robot)]
+    able = flange_series(described.poses, found)
+    left = [f"{s.key or s.layout}" for s in found if s.role == "board"]
+    if left:
+        note = f"{', '.join(dict.fromkeys(left))} is taken as the board's pose and not used"
+        able = [series.with_notes(note) for series in able]
+    return able
+
+
+def _only(found: Sequence[Series]) -> list[Series]:
+    """The one series of a file that the user says holds joint angles."""
+    return [series for series in found if series.values.ndim == 2 and len(series.poses) > 1][:1]
+
+
+def _joint_series(described: Described) -> Series | None:
+    """Joint angles to put beside poses: from their own file, or the poses' file."""
+    for path in (described.joints, described.poses):
+        if path is None:
+            continue
+        found = read_series(path)
+        able = [s for s in found if s.role == "joints"]
+        if not able and path == described.joints:
+            able = _only(found)
+        for series in able:
+            if all(len(pose.values) == 6 for pose in series.poses):
+                return series
+    return None
+
+
+def _posed(
+    series: Sequence[Series],
+    pictures: Sequence[Path],
+    corners: Corners,
+    board: Board,
+    described: Described,
+) -> _Posed:
+    names = [picture.name for picture in pictures]
+    candidates = []
+    for each in series:
+        of = f", poses from {each.key}" if re.search("[a-z]", each.key) else ""
+        notes = (f"the pose file is read as {each.layout}{of}", *each.notes)
+        ways = pairings(names, each.poses, described.time_bound_s)
+        candidates += [Candidate(each.poses, way, notes) for way in ways]
+    mount: Mount = described.mount or "eye_in_hand"
+    check = _check(len(pictures), corners, board, mount)
+    chosen, convention = conclude(candidates, described.said, check, board.square_m)
+    matrices = np.array([convention.transform(pose).as_matrix() for pose in chosen.poses])
+    guessed = convention.guessed
+    if described.mount is None and described.said.inverted is None and check is not None:
+        guessed = (*guessed, _mount_or_direction(convention))
+    return _Posed(
+        apply(chosen.pairing, matrices),
+        _joints(names, described),
+        convention,
+        guessed,
+    )
+
+
+def _mount_or_direction(convention: Convention) -> str:
+    """The pair of readings that no picture tells apart."""
+    one, other = "base_from_flange", "flange_from_base"
+    if convention.inverted:
+        one, other = other, one
+    return _BOTH_MOUNTS.format(
+        one=f"the camera is on the flange and the poses are {one}",
+        other=f"the camera stands still and the poses are {other}",
+    )
+
+
+def _joints(names: Sequence[str], described: Described) -> FloatArray:
+    out = np.full((len(names), 6), np.nan)
+    series = _joint_series(described)
+    if series is None:
+        return out
+    angles = radians(in_order(series))
+    if angles is None:
+        return out
+    pairing = pairings(names, series.poses, described.time_bound_s)[0]
+    for picture, index in enumerate(pairing.poses):
+        if index >= 0:
+            out[picture] = angles[index]
+    return out
 
 
 def _corners_of(
@@ -157,90 +275,69 @@ def _corners_of(
     return detect_corners(Recording(source, header, tuple(frames)), progress)
 
 
-def _witness(
-    pairs: Sequence[tuple[Path, RawPose | None]], corners: Corners, board: Board, mount: Mount
-) -> Witness | None:
+def _check(pictures: int, corners: Corners, board: Board, mount: Mount) -> PictureCheck | None:
     """What the whole boards among the pictures say of a reading of the poses."""
-    posed = [k for k, (_, pose) in enumerate(pairs) if pose is not None]
-    whole = [
-        k for k, frame in enumerate(posed)
-        if frame in corners.px and np.isfinite(corners.px[frame]).all()
-    ]  # fmt: skip
+    whole = [k for k in range(pictures) if k in corners.px and np.isfinite(corners.px[k]).all()]
     if len(whole) < _ENOUGH_TO_ASK:
         return None
-    seen = np.array([corners.px[posed[k]] for k in whole])
+    rough = RoughPoses.of(np.array([corners.px[k] for k in whole]), board, mount)
 
-    def misfits(readings: Sequence[FloatArray]) -> FloatArray:
-        return pose_misfits(seen, board, [reading[whole] for reading in readings], mount)
+    def closure(by_picture: FloatArray) -> Closure | None:
+        read = by_picture[whole]
+        known = int(np.isfinite(read).all(axis=(1, 2)).sum())
+        return rough.closure(read) if known >= _ENOUGH_TO_ASK else None
 
-    return misfits
-
-
-def _pairs(pictures: Sequence[Path], poses: Sequence[RawPose]) -> list[tuple[Path, RawPose | None]]:
-    """Pictures with their poses: by number where both tell one, else one by one."""
-    if not poses:
-        return [(picture, None) for picture in pictures]
-    by_number = {pose.number: pose for pose in poses}
-    if None not in by_number and len(by_number) == len(poses):
-        return [(picture, by_number.get(number_in(picture.stem))) for picture in pictures]
-    if len(poses) != len(pictures):
-        raise InputError(
-            f"{len(pictures)} pictures and {len(poses)} poses, and nothing tells which belong"
-            " together. Remove the ones without a partner, or number both."
-        )
-    return list(zip(pictures, poses, strict=True))
+    return closure
 
 
 def _header(source: Path, pictures: Sequence[Path], described: Described) -> Header:
-    height, width = _size(pictures)
+    height, width = picture_size(pictures)
     data: dict[str, Any] = {
         "schema": "cell.recording/1",
         "name": described.name or source.resolve().name,
         "robot": {"model": described.robot},
         "camera": {"model": None, "width": width, "height": height},
         "board": described.board,
-        "mount": described.mount,
+        "mount": described.mount or "eye_in_hand",
         "images": "images/",
-        "imported": {"from": str(source), "poses": str(described.poses or "none")},
+        "imported": {"from": str(source), "poses": str(described.poses or described.joints or "")},
     }
     return Header.model_validate(data)
 
 
-def _told(header: Header, convention: Convention) -> dict[str, Any]:
+def _told(header: Header, posed: _Posed) -> dict[str, Any]:
     """What `recording.yaml` says of where the recording came from."""
     known = dict((header.model_extra or {})["imported"])
-    known |= {"rotation": convention.rotation, "unit": convention.unit}
-    return known | {"inverted": convention.inverted, "guessed": list(convention.guessed)}
+    read = posed.convention
+    known |= {"rotation": read.rotation, "unit": read.unit, "inverted": read.inverted}
+    return known | {"guessed": list(posed.guessed), "contradicted": list(read.contradicted)}
 
 
-def _size(pictures: Sequence[Path]) -> tuple[int, int]:
-    """(height, width) of the first picture that is one."""
-    for picture in pictures:
-        image = cv2.imdecode(np.fromfile(picture, np.uint8), cv2.IMREAD_UNCHANGED)
-        if image is not None:
-            return image.shape[0], image.shape[1]
-    raise InputError(f"{pictures[0].parent}: none of the {len(pictures)} pictures is an image")
+def _no_poses(source: Path) -> tuple[str, ...]:
+    """What to say where no poses were given."""
+    beside = pose_files_beside(source)
+    hint = f"; {', '.join(beside[:3])} beside the pictures may hold them" if beside else ""
+    return (f"no flange poses: the lens alone can be calibrated. Give --poses FILE{hint}",)
 
 
-def _frame(
-    frame: int,
-    name: str,
-    picture: Path,
-    pose: RawPose | None,
-    convention: Convention | None,
-) -> FrameRecord:
+def _frame(frame: int, name: str, picture: Path, posed: _Posed | None) -> FrameRecord:
     values: dict[str, Any] = {"frame": frame, "image": name, "source": picture.name}
-    if pose is not None and convention is not None:
-        values["base_from_flange"] = PoseRecord.of(convention.transform(pose))
+    if posed is not None and np.isfinite(posed.matrices[frame]).all():
+        pose = RigidTransform.from_matrix(posed.matrices[frame])
+        values["base_from_flange"] = PoseRecord.of(pose)
+    if posed is not None and np.isfinite(posed.joints_rad[frame]).all():
+        values["joints_rad"] = tuple(posed.joints_rad[frame].tolist())
     return FrameRecord.model_validate(values)
 
 
-def _find_corners(
+def _checked(
     recording: Recording,
-    guessed: tuple[str, ...],
     corners: Corners | None,
+    guessed: tuple[str, ...],
+    contradicted: tuple[str, ...],
     progress: Progress | None,
 ) -> Imported:
+    """The recording's corners, found where they did not come with it, and what there is to say."""
     if recording.has_detections:
         corners = recording.detections()
     else:
@@ -254,6 +351,13 @@ def _find_corners(
             f"{recording.path}: the board was found in none of {len(recording.frames)} pictures."
             f" Check rows, cols and type of the board.{reasons}"
         )
+    posed = sum(frame.base_from_flange is not None for frame in recording.frames)
     return Imported(
-        recording.path, len(recording.frames), len(corners.px), guessed, dict(corners.rejected)
+        recording.path,
+        len(recording.frames),
+        len(corners.px),
+        posed,
+        guessed,
+        dict(corners.rejected),
+        contradicted,
     )

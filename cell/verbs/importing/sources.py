@@ -1,0 +1,58 @@
+"""The pictures and pose files of a folder that another tool left."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from cell.errors import InputError
+from cell.verbs.importing.pose_files import IMAGE_SUFFIXES, visible
+
+_DEPTH = re.compile(r"depth|disparity|(?:^|[_-])(?:ir|infra\w*)(?:[_-]|\d|$)", re.IGNORECASE)
+_TABLES = (".csv", ".json", ".yaml", ".yml", ".txt", ".npz", ".samples")
+
+
+def pictures_in(folder: Path) -> tuple[list[Path], tuple[str, ...]]:
+    """The pictures in natural order, and what was left out, to be said aloud.
+
+    Hidden files are none, and depth or infrared pictures that stand beside colour ones are left
+    out.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    found = [path for path in visible(folder) if path.suffix.lower() in IMAGE_SUFFIXES]
+    if not found:
+        inner = [p.name for p in sorted(folder.iterdir()) if p.is_dir() and _has_pictures(p)]
+        hint = f"; its folder {inner[0]} has: name that one" if inner else ""
+        raise InputError(f"{folder}: has no pictures ({', '.join(IMAGE_SUFFIXES)}){hint}")
+    colour = [path for path in found if not _DEPTH.search(path.stem)]
+    depth = len(found) - len(colour)
+    if not colour or not depth:
+        return found, ()
+    return colour, (f"{depth} depth or infrared pictures beside the others are left out",)
+
+
+def _has_pictures(folder: Path) -> bool:
+    return any(path.suffix.lower() in IMAGE_SUFFIXES for path in visible(folder))
+
+
+def pose_files_beside(folder: Path) -> list[str]:
+    """Names of files in a folder of pictures that may hold poses."""
+    return [path.name for path in visible(folder) if path.suffix.lower() in _TABLES]
+
+
+def picture_size(pictures: Sequence[Path]) -> tuple[int, int]:
+    """(height, width) of the first picture that is one; raises `InputError` without any."""
+    for picture in pictures:
+        data = np.fromfile(picture, np.uint8)
+        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+        if image is not None:
+            return image.shape[0], image.shape[1]
+    raise InputError(f"{pictures[0].parent}: none of the {len(pictures)} pictures is an image")
