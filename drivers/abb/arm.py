@@ -125,7 +125,12 @@ class ABBArm:
         if running:
             raise DeviceRefused(self._named("a RAPID program is running: stop it first"))
         if self._settings.egm_port is not None:
-            self._egm = EgmReader(self._settings.egm_port, offset.inv())
+            self._egm = EgmReader(
+                self._settings.egm_port,
+                self._url,
+                offset.inv(),
+                self._settings.joint_limits_rad,
+            )
         supervisor.start(offset)
         self._supervisor = supervisor
 

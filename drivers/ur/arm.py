@@ -22,9 +22,10 @@ from drivers.ur.kinematics_info import KinematicsInfo, read_kinematics
 from drivers.ur.motion import MoveOrder
 from drivers.ur.pose import base_from_flange, base_from_tcp, pose_of
 from drivers.ur.reader import Packet, RtdeReader
+from drivers.ur.runtime import Runtime
 from drivers.ur.settings import URSettings
 from drivers.ur.speed import leading_joint_speed_rad_s, tcp_speed_m_s
-from drivers.ur.status import Runtime, fault_in
+from drivers.ur.status import fault_in
 from drivers.ur.supervisor import Supervisor
 from drivers.ur.verdicts import at_rest
 

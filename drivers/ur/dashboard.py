@@ -11,12 +11,17 @@ import threading
 import time
 
 from drivers.errors import DeviceUnreachable
+from drivers.outside import printable, receive_within
 
 DASHBOARD_PORT = 29999
+_LONGEST_LINE = 4096
 
 
 class Dashboard:
-    """One connection to the dashboard server; opened on first use and again after a failure."""
+    """One connection to the dashboard server; opened on first use and again after a failure.
+
+    Answers are one printable line, shortened where they are long.
+    """
 
     def __init__(self, host: str) -> None:
         self._host = host
@@ -32,6 +37,7 @@ class Dashboard:
                 if self._link is None:
                     self._open(deadline)
                 assert self._link is not None
+                self._rest = b""  # an answer that nobody asked for belongs to no question
                 self._link.sendall(f"{line}\n".encode())
                 return self._line(self._link, deadline)
             except OSError as error:
@@ -48,26 +54,20 @@ class Dashboard:
 
     def _open(self, deadline: float) -> None:
         address = (self._host, DASHBOARD_PORT)
-        self._link = socket.create_connection(address, _left(deadline))
+        self._link = socket.create_connection(address, max(deadline - time.monotonic(), 1e-3))
         self._rest = b""
         self._line(self._link, deadline)
 
     def _line(self, link: socket.socket, deadline: float) -> str:
         while b"\n" not in self._rest:
-            link.settimeout(_left(deadline))
-            chunk = link.recv(4096)
-            if not chunk:
-                raise ConnectionError("connection closed")
-            self._rest += chunk
+            if len(self._rest) > _LONGEST_LINE:
+                raise ConnectionError("a line without an end")
+            self._rest += receive_within(link, _LONGEST_LINE, deadline)
         line, self._rest = self._rest.split(b"\n", 1)
-        return line.decode(errors="replace").strip()
+        return printable(line.decode(errors="replace"))
 
     def _drop(self) -> None:
         if self._link is not None:
             with contextlib.suppress(OSError):
                 self._link.close()
         self._link = None
-
-
-def _left(deadline: float) -> float:
-    return max(deadline - time.monotonic(), 1e-3)

@@ -15,6 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.errors import DeviceError
+from drivers.outside import exactly
+
 PRIMARY_PORT = 30001
 _ROBOT_STATE, _KINEMATICS = 16, 5
 _HEADER = struct.Struct(">IB")
@@ -64,35 +67,36 @@ class KinematicsInfo:
 
 
 def read_kinematics(host: str, timeout_s: float = 1.0) -> KinematicsInfo | None:
-    """Return what the primary port tells, or None where it tells nothing within the time-out."""
+    """Return what the primary port tells, or None where it tells nothing within the time-out.
+
+    Raises `DeviceError` for kinematics that are not finite.
+    """
     deadline = time.monotonic() + timeout_s
     try:
         with socket.create_connection((host, PRIMARY_PORT), timeout_s) as link:
-            while (left_s := deadline - time.monotonic()) > 0:
-                link.settimeout(left_s)
-                found = _find(_package(link))
+            while True:
+                found = _find(_package(link, deadline))
                 if found is not None:
-                    return found
+                    return _checked(host, found)
     except (OSError, struct.error):
         return None
-    return None
 
 
-def _package(link: socket.socket) -> tuple[int, bytes]:
-    size, kind = _HEADER.unpack(_exactly(link, _HEADER.size))
+def _package(link: socket.socket, deadline: float) -> tuple[int, bytes]:
+    size, kind = _HEADER.unpack(exactly(link, _HEADER.size, deadline))
     if not _HEADER.size <= size <= _LONGEST_PACKAGE:
         raise ConnectionError(f"a package claims a size of {size} bytes")
-    return kind, _exactly(link, size - _HEADER.size)
+    return kind, exactly(link, size - _HEADER.size, deadline)
 
 
-def _exactly(link: socket.socket, count: int) -> bytes:
-    data = link.recv(count, socket.MSG_WAITALL)
-    while len(data) < count:
-        chunk = link.recv(count - len(data))
-        if not chunk:
-            raise ConnectionError("connection closed")
-        data += chunk
-    return data
+def _checked(host: str, found: KinematicsInfo) -> KinematicsInfo:
+    tables = (found.theta_rad, found.a_m, found.d_m, found.alpha_rad)
+    if not np.isfinite(tables).all():
+        raise DeviceError(
+            f"UR controller {host}: the kinematics on port {PRIMARY_PORT} are not finite. Restart "
+            "the controller; if it goes on, its calibration file is damaged"
+        )
+    return found
 
 
 def _find(package: tuple[int, bytes]) -> KinematicsInfo | None:

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable
+from drivers.ur.plausible import implausible
 from drivers.ur.wire import PROTOCOL_VERSION, RTDE_PORT, Frame, Recipe, Value, encode, receive
 
 OUTPUTS = [
@@ -87,8 +88,9 @@ class RtdeReader:
         """Open, negotiate, and wait for the first packet; raises `DeviceError`."""
         self.close()
         try:
+            deadline_s = time.monotonic() + timeout_s
             self._link = socket.create_connection((self._host, RTDE_PORT), timeout_s)
-            recipe = self._negotiate(self._link)
+            recipe = self._negotiate(self._link, deadline_s)
         except (OSError, struct.error) as error:
             self.close()
             raise DeviceUnreachable(
@@ -142,36 +144,39 @@ class RtdeReader:
         with self._fresh:
             self._fresh.wait_for(lambda: condition() or self._lost is not None, timeout_s)
 
-    def _negotiate(self, link: socket.socket) -> Recipe:
+    def _negotiate(self, link: socket.socket, deadline_s: float) -> Recipe:
         version = struct.pack(">H", PROTOCOL_VERSION)
-        if self._ask(link, Frame.REQUEST_PROTOCOL_VERSION, version) != b"\x01":
+        if self._ask(link, deadline_s, Frame.REQUEST_PROTOCOL_VERSION, version) != b"\x01":
             raise DeviceRefused(f"UR controller {self._host}: speaks no RTDE version 2: update it")
         asked = struct.pack(">d", self._rate_hz) + ",".join(OUTPUTS).encode()
-        answer = self._ask(link, Frame.SETUP_OUTPUTS, asked)
-        types = answer[1:].decode().split(",")
+        answer = self._ask(link, deadline_s, Frame.SETUP_OUTPUTS, asked)
+        types = answer[1:].decode(errors="replace").split(",")
         missing = [name for name, kind in zip(OUTPUTS, types, strict=False) if kind == "NOT_FOUND"]
         if missing:
             raise DeviceRefused(
                 f"UR controller {self._host}: does not know {', '.join(missing)}. The flange pose "
                 "needs tcp_offset, which exists from PolyScope 5.5.1 (CB3: 3.12): update it"
             )
-        if self._ask(link, Frame.START) != b"\x01":
+        try:
+            recipe = Recipe(OUTPUTS, types)
+        except ValueError as error:
+            raise DeviceError(f"UR controller {self._host}: RTDE answers {error}") from None
+        if self._ask(link, deadline_s, Frame.START) != b"\x01":
             raise DeviceError(f"UR controller {self._host}: refuses to start sending its state")
-        return Recipe(OUTPUTS, types)
+        return recipe
 
     @staticmethod
-    def _ask(link: socket.socket, kind: Frame, payload: bytes = b"") -> bytes:
+    def _ask(link: socket.socket, deadline_s: float, kind: Frame, payload: bytes = b"") -> bytes:
         link.sendall(encode(kind, payload))
-        while True:
-            answered, answer = receive(link)
+        while True:  # messages of its own may come first; the deadline is for all of them
+            answered, answer = receive(link, deadline_s)
             if answered == kind:
                 return answer
 
     def _read(self, link: socket.socket, recipe: Recipe) -> None:
-        link.settimeout(self._silence_s)
         try:
-            while True:
-                kind, body = receive(link)
+            while self._lost is None:
+                kind, body = receive(link, time.monotonic() + self._silence_s)
                 if kind == Frame.DATA_PACKAGE:
                     self._take(Packet(time.monotonic(), recipe.unpack(body[1:])))
         except TimeoutError:
@@ -180,6 +185,10 @@ class RtdeReader:
             self._lose(str(error))
 
     def _take(self, packet: Packet) -> None:
+        wrong = implausible(packet.values)
+        if wrong is not None:
+            self._lose(f"what the controller sends cannot be: {wrong}")
+            return
         with self._fresh:
             before = self._newest
             self._newest = packet

@@ -5,8 +5,6 @@ Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", robot controll
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 from drivers.ur.reader import Packet
 
 ROBOT_RUNNING = 7
@@ -37,17 +35,6 @@ _SAFETY_BITS = {
         "find out what it ran into, clear it, wait five seconds, unlock it at the teach pendant",
     ),
 }
-
-
-class Runtime(IntEnum):
-    """``runtime_state``: what the program on the controller is doing."""
-
-    STOPPING = 0
-    STOPPED = 1
-    PLAYING = 2
-    PAUSING = 3
-    PAUSED = 4
-    RESUMING = 5
 
 
 def fault_in(packet: Packet) -> str | None:

@@ -19,6 +19,7 @@ from drivers.ur.dashboard import DASHBOARD_PORT
 
 SCRIPT_PORT = 30003
 _CONNECT_S = 0.02
+_MOST_UNREAD = 16
 
 
 class StopPaths:
@@ -65,14 +66,18 @@ class StopPaths:
             link.sendall(self._script)
 
     def _alive(self) -> bool:
-        """Whether the kept connection is open; drains the answers, which nobody needs."""
+        """Whether the kept connection is open; drains the answers, which nobody needs.
+
+        One that never ends is given up: the stop must not wait for it.
+        """
         if self._dashboard is None:
             return False
         # a socket with a time-out would wait for it in recv, whatever the flags
         self._dashboard.setblocking(False)
         try:
-            while self._dashboard.recv(4096):
-                pass
+            for _ in range(_MOST_UNREAD):
+                if not self._dashboard.recv(4096):
+                    break
         except BlockingIOError:
             return True
         except OSError:

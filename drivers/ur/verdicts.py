@@ -9,7 +9,7 @@ import numpy as np
 from drivers.ur.motion import MotionChild, MoveOrder, Phase
 from drivers.ur.pose import transform_of
 from drivers.ur.reader import Packet
-from drivers.ur.status import Runtime
+from drivers.ur.runtime import Runtime
 
 AT_REST_RAD_S = 0.01
 _ARRIVED_RAD, _ARRIVED_M = 0.01, 0.002

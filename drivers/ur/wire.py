@@ -10,6 +10,8 @@ import socket
 import struct
 from enum import IntEnum
 
+from drivers.outside import exactly
+
 RTDE_PORT = 30004
 PROTOCOL_VERSION = 2
 _HEADER = struct.Struct(">HB")
@@ -51,13 +53,24 @@ class Recipe:
     names:
         Variable names as the controller knows them.
     types:
-        Their RTDE types, such as ``VECTOR6D``; raises `KeyError` for one that RTDE has not.
+        Their RTDE types, such as ``VECTOR6D``, one for each name; raises `ValueError` where one
+        is missing or unknown.
     """
 
     def __init__(self, names: list[str], types: list[str]) -> None:
+        if len(names) != len(types):
+            raise ValueError(f"{len(types)} types for {len(names)} names")
+        for name, kind in zip(names, types, strict=True):
+            if kind not in _STRUCT_CODES:
+                raise ValueError(f"an unknown type for {name}")
         self.names = names
         self._widths = [_width(kind) for kind in types]
         self._struct = struct.Struct(">" + "".join(_STRUCT_CODES[kind] for kind in types))
+
+    @property
+    def size(self) -> int:
+        """Bytes of a package's fields."""
+        return self._struct.size
 
     def unpack(self, body: bytes) -> dict[str, Value]:
         """Return name -> value; vectors are tuples. Raises `struct.error` on a wrong length."""
@@ -86,27 +99,24 @@ def encode(kind: int, payload: bytes = b"") -> bytes:
     return _HEADER.pack(len(payload) + _HEADER.size, kind) + payload
 
 
-def receive(link: socket.socket) -> tuple[int, bytes]:
+def receive(link: socket.socket, deadline_s: float | None = None) -> tuple[int, bytes]:
     """Read one frame: (type, payload).
+
+    Parameters
+    ----------
+    link:
+        An open connection.
+    deadline_s:
+        For the whole frame, on the monotonic clock; None for the socket's own time-out.
 
     Raises
     ------
     ConnectionError
         The other side closed, or the size in the header is impossible.
     TimeoutError
-        Nothing came within the socket's own time-out.
+        The frame did not come in time.
     """
-    size, kind = _HEADER.unpack(_exactly(link, _HEADER.size))
+    size, kind = _HEADER.unpack(exactly(link, _HEADER.size, deadline_s))
     if size < _HEADER.size:
         raise ConnectionError(f"an RTDE frame claims a size of {size} bytes")
-    return kind, _exactly(link, size - _HEADER.size)
-
-
-def _exactly(link: socket.socket, count: int) -> bytes:
-    data = bytearray()
-    while len(data) < count:
-        chunk = link.recv(count - len(data))
-        if not chunk:
-            raise ConnectionError("the other side closed the connection")
-        data += chunk
-    return bytes(data)
+    return kind, exactly(link, size - _HEADER.size, deadline_s)

@@ -74,7 +74,7 @@ class ABBController:
         self.world_from_base = RigidTransform.identity()
         self.flange_from_active_tool = RigidTransform.identity()
         self.watch = CellWatch(self._stop_for_silence)
-        self._egm = EgmSender(self, (address, egm_port)) if egm_port else None
+        self._egm = EgmSender(self, address, egm_port) if egm_port else None
         self._stop_rapid = threading.Event()
         self._program: threading.Thread | None = None
         self._lock = threading.RLock()

@@ -20,6 +20,7 @@ from drivers.arm import ArmState
 from sim.peers.controller_faults import ControllerFaults
 
 _PERIOD_S = 0.008
+_HOST = "127.0.0.1"
 
 
 class Controller(Protocol):
@@ -38,11 +39,11 @@ class Controller(Protocol):
 
 
 class EgmSender:
-    """Sends one message a period to one address."""
+    """Sends one message a period from the controller's address to one port of this host."""
 
-    def __init__(self, controller: Controller, target: tuple[str, int]) -> None:
+    def __init__(self, controller: Controller, address: str, port: int) -> None:
         self._controller = controller
-        self._target = target
+        self._address, self._target = address, (_HOST, port)
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._send, name="egm", daemon=True)
         self._number = 0
@@ -59,6 +60,7 @@ class EgmSender:
 
     def _send(self) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            link.bind((self._address, 0))
             while not self._closing.wait(_PERIOD_S):
                 if self._controller.running and not self._controller.faults.mute:
                     with contextlib.suppress(OSError):
