@@ -11,9 +11,13 @@ import json
 import time
 from typing import Any
 
-from drivers.errors import DeviceError, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.jpeg import jpeg_size
 
 PORT = 4242
+MOST_PIXELS = 1 << 24
+"""The sensor has 5 million."""
+_LARGEST_ANSWER_BYTES = 1 << 25
 _CHUNK_BYTES = 1 << 16
 
 
@@ -31,10 +35,18 @@ class RobotiqHttp:
         ------
         FrameLost
             What came is cut short or no JPEG.
+        DeviceRefused
+            The picture has more pixels than `MOST_PIXELS`; it was not decoded.
         """
         body = self._request("GET", "/current.jpg?type=color", None, deadline_s)
-        if not (body.startswith(b"\xff\xd8") and body.rstrip(b"\0").endswith(b"\xff\xd9")):
+        size = jpeg_size(body)
+        if size is None or not body.rstrip(b"\0").endswith(b"\xff\xd9"):
             raise FrameLost(f"{self.name}: what came as a picture is no whole JPEG file")
+        if size[0] * size[1] > MOST_PIXELS:
+            raise DeviceRefused(
+                f"{self.name}: a picture of {size[0]} x {size[1]} pixels came, which no such camera"
+                f" has (at most {MOST_PIXELS} pixels are taken). See what answers at that address"
+            )
         return body
 
     def settings(self, deadline_s: float) -> dict[str, Any] | None:
@@ -42,7 +54,7 @@ class RobotiqHttp:
         try:
             body = self._request("GET", "/getcamerasettings", None, deadline_s)
             settings = json.loads(body)["cameraSettings"]
-        except (DeviceError, ValueError, KeyError, TypeError) as error:
+        except (DeviceError, ValueError, KeyError, TypeError, RecursionError) as error:
             if isinstance(error, DeviceUnreachable):
                 raise
             return None
@@ -78,9 +90,8 @@ class RobotiqHttp:
             self._connection.close()
             if isinstance(error, http.client.IncompleteRead):
                 raise FrameLost(f"{self.name}: the answer was cut short") from None
-            reason = str(error) or type(error).__name__
             raise DeviceUnreachable(
-                f"{self.name}: {reason}; check the robot's address and that the Robotiq "
+                f"{self.name}: {_reason(error)}; check the robot's address and that the Robotiq "
                 "camera's URCap runs"
             ) from None
 
@@ -90,9 +101,12 @@ class RobotiqHttp:
         self._connection.request(verb, path, body, headers)
         self._limit(deadline_s)
         answer = self._connection.getresponse()
-        parts = []
+        parts, size_bytes = [], 0
         while chunk := answer.read1(_CHUNK_BYTES):
             parts.append(chunk)
+            size_bytes += len(chunk)
+            if size_bytes > _LARGEST_ANSWER_BYTES:
+                raise http.client.HTTPException
             self._limit(deadline_s)
         missing_bytes = answer.length
         answer.close()
@@ -100,7 +114,7 @@ class RobotiqHttp:
         if missing_bytes:
             raise http.client.IncompleteRead(whole, missing_bytes)
         if answer.status != http.client.OK:
-            raise DeviceError(f"{self.name}: {path} answers {answer.status} {answer.reason}")
+            raise DeviceError(f"{self.name}: {path} answers HTTP status {answer.status}")
         return whole
 
     def _limit(self, deadline_s: float) -> None:
@@ -110,3 +124,10 @@ class RobotiqHttp:
         self._connection.timeout = left_s
         if self._connection.sock is not None:
             self._connection.sock.settimeout(left_s)
+
+
+def _reason(error: Exception) -> str:
+    """Why nothing came, in words of ours: what the other side sent is for no message."""
+    if isinstance(error, http.client.HTTPException):
+        return f"what answers does not speak HTTP as it should ({type(error).__name__})"
+    return str(error) or type(error).__name__

@@ -18,6 +18,7 @@ from drivers.robotiq_http import RobotiqHttp
 Settings = dict[str, Any]
 
 _AUTOS = ("exposureAuto", "whiteBalanceAuto")
+_NUMBERS, _MOST = ("exposure", "gain", "focus"), 1e6
 _UNIT_GAIN = 16
 _LARGEST_GAIN_FACTOR = 63
 _LONGEST_EXPOSURE_US = 66604
@@ -43,11 +44,18 @@ class RobotiqSettings:
         settings = self._http.settings(deadline_s)
         self.supported = settings is not None
         if settings:
+            _checked(settings)
             self._change({name: False for name in _AUTOS if name in settings}, deadline_s)
 
     def read(self, deadline_s: float) -> Settings:
-        """All settings as the camera tells them; empty where it tells none."""
-        return (self._http.settings(deadline_s) or {}) if self.supported else {}
+        """All settings as the camera tells them; empty where it tells none.
+
+        Raises
+        ------
+        DeviceError
+            One of those that are used here is not the number or the switch that it must be.
+        """
+        return _checked(self._http.settings(deadline_s) or {}) if self.supported else {}
 
     def set(
         self, exposure_s: float | None, gain_db: float | None, deadline_s: float
@@ -99,7 +107,7 @@ class RobotiqSettings:
         if settings.get("focusAuto") is not False or settings.get("focus") != self._locked_at:
             raise DeviceRefused(
                 f"the focus was locked at {self._locked_at:g} and the camera now has "
-                f"{settings.get('focus')} (automatic: {settings.get('focusAuto')}); "
+                f"{settings.get('focus', 'none')} (automatic: {settings.get('focusAuto')}); "
                 "somebody else changes its settings"
             )
         return True
@@ -131,6 +139,17 @@ class RobotiqSettings:
             if got.get(name) != value:
                 raise DeviceRefused(f"{name} set to {value}, the camera has {got.get(name)}")
         return got
+
+
+def _checked(settings: Settings) -> Settings:
+    for name in _NUMBERS:
+        value = settings.get(name, 0)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= _MOST:
+            raise DeviceError(f"the camera's setting {name} is no number that it can have")
+    for name in (*_AUTOS, "focusAuto"):
+        if not isinstance(settings.get(name, False), bool):
+            raise DeviceError(f"the camera's setting {name} is neither true nor false")
+    return settings
 
 
 def values_of(settings: Settings) -> dict[str, float]:

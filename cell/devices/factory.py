@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 from cell.devices.genicam_options import genicam_options
 from cell.errors import InputError
@@ -97,11 +96,17 @@ def _ur_at(address: str) -> Arm:
 
 
 def _abb_at(url: str) -> Arm:
-    from drivers.abb import ABBArm, ABBSettings
+    from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings
 
     return ABBArm(
         url,
-        ABBSettings(silence_s=5.0, link_watch_s=4.0, connect_timeout_s=2.0, read_timeout_s=4.0),
+        ABBSettings(
+            login=FACTORY_LOGIN,
+            silence_s=5.0,
+            link_watch_s=4.0,
+            connect_timeout_s=2.0,
+            read_timeout_s=4.0,
+        ),
     )
 
 
@@ -125,25 +130,23 @@ def real_devices(plan: Plan) -> Devices:
     Raises
     ------
     InputError
-        Arm or camera is a simulated one.
+        Arm or camera is a simulated one, or there is no login for the arm's controller.
     """
     return Devices(arm_of(plan.cell), camera_of(plan.cell))
 
 
 def arm_of(cell: CellFile) -> Arm:
-    """The driver of a cell's arm, not yet connected; raises `InputError` for a simulated one."""
+    """The driver of a cell's arm, not yet connected; raises `InputError` as `real_devices` does."""
     robot = cell.robot
     if isinstance(robot, UniversalRobot):
         from drivers.ur import URArm, URSettings
 
         return URArm(robot.address, URSettings(upper_registers=robot.upper_registers))
     if isinstance(robot, AbbRobot):
-        from drivers.abb import ABBArm, ABBSettings
+        from cell.devices.abb_settings import abb_settings
+        from drivers.abb import ABBArm
 
-        settings = ABBSettings(robot.user, robot.password, egm_port=robot.egm_port)
-        if not robot.link_watch:
-            settings = replace(settings, link_watch_s=None)
-        return ABBArm(f"http://{robot.address}", settings)
+        return ABBArm(robot.address, abb_settings(robot))
     raise InputError(_only_simulated(cell, "arm"))
 
 

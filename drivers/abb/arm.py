@@ -10,6 +10,7 @@ from drivers.abb.rws import named
 from drivers.abb.settings import ABBSettings
 from drivers.abb.status import fault_in
 from drivers.abb.supervisor import Supervisor
+from drivers.abb.transport import resolved
 from drivers.arm import ArmState, Motion, MoveTarget
 from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable, StopFailed
 from drivers.targets import check_target
@@ -21,16 +22,16 @@ class ABBArm:
 
     Parameters
     ----------
-    url:
-        Such as ``http://192.168.125.1``.
+    address:
+        Such as ``192.168.125.1``; see `drivers.abb.transport.resolved`.
     settings:
         See `ABBSettings`.
     """
 
     tried_on_hardware = False
 
-    def __init__(self, url: str, settings: ABBSettings | None = None) -> None:
-        self._url = url
+    def __init__(self, address: str, settings: ABBSettings | None = None) -> None:
+        self._address = self._url = address
         self._settings = settings or ABBSettings()
         self._supervisor: Supervisor | None = None
         self._egm: EgmReader | None = None
@@ -43,13 +44,15 @@ class ABBArm:
         DeviceUnreachable
             No answer.
         DeviceRefused
-            Wrong password, a RAPID program is running already, or no task there watches the link.
+            No password or a wrong one, a certificate that is not trusted, a RAPID program is
+            running already, or no task there watches the link.
         ArmStopped
             Not in automatic mode, motors off, or stopped for safety.
         """
         self.close()
         atexit.register(self.close)
-        warn_untried(f"ABB arm at {self._url}", "a simulated IRC5 on loopback")
+        warn_untried(f"ABB arm at {self._address}", "a simulated IRC5 on loopback")
+        self._url = resolved(self._address, self._settings.certificate_sha256)
         supervisor = Supervisor(self._url, self._settings)
         try:
             self._open(supervisor)

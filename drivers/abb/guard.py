@@ -9,14 +9,58 @@ stands alone.
 from __future__ import annotations
 
 import json
+import ssl
 import sys
 from typing import Any
 
 _TRIES = 3
+_NO_CONTENT, _REFUSED = 204, 300
 _ORDERS = (
     ("rw/rapid/execution?action=stop", {"stopmode": "stop"}),
     ("rw/panel/ctrlstate?action=setctrlstate", {"ctrl-state": "motoroff"}),
 )
+
+
+def plain(fingerprint: str) -> str:
+    """A fingerprint without colons, in small letters."""
+    return fingerprint.replace(":", "").strip().lower()
+
+
+def bare_tls() -> ssl.SSLContext:
+    """TLS that knows no authorities.
+
+    None has signed a controller's certificate, and to load them takes longer than a stop may.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    return context
+
+
+def session_for(certificate_sha256: str | None) -> Any:
+    """Return a `requests.Session` to one controller.
+
+    It takes no proxy and no password from its surroundings, follows nobody elsewhere, and trusts
+    the certificate with this fingerprint only.
+    """
+    import requests
+
+    session = requests.Session()
+    session.trust_env = False
+    if certificate_sha256 is not None:
+        session.verify = False  # the fingerprint is checked in place of a chain of signatures
+        session.mount("https://", _pinned(plain(certificate_sha256)))
+    return session
+
+
+def _pinned(fingerprint: str) -> Any:
+    from requests.adapters import HTTPAdapter
+
+    class Pinned(HTTPAdapter):
+        def init_poolmanager(self, *arguments: Any, **more: Any) -> Any:
+            more |= {"assert_fingerprint": fingerprint, "ssl_context": bare_tls()}
+            return super().init_poolmanager(*arguments, **more)
+
+    return Pinned()
 
 
 class StopSession:
@@ -28,20 +72,28 @@ class StopSession:
         Of Robot Web Services.
     timeout_s:
         Of every request.
+    certificate_sha256:
+        Fingerprint of the certificate that is trusted; None for HTTP.
     """
 
-    def __init__(self, url: str, user: str, password: str, timeout_s: float) -> None:
-        import requests
+    def __init__(
+        self,
+        url: str,
+        user: str,
+        password: str,
+        timeout_s: float,
+        certificate_sha256: str | None = None,
+    ) -> None:
         from requests.auth import HTTPDigestAuth
 
         self._url = url
         self._timeout_s = timeout_s
-        self._session = requests.Session()
+        self._session = session_for(certificate_sha256)
         self._session.auth = HTTPDigestAuth(user, password)
 
     def log_in(self) -> None:
         """Make the first request, which costs the challenge; raises `OSError`."""
-        self._session.get(f"{self._url}/rw/rapid/execution?json=1", timeout=self._timeout_s)
+        self._ask("GET", f"{self._url}/rw/rapid/execution?json=1")
 
     def stop(self) -> str | None:
         """Stop RAPID, or else the motors; return None, or why neither could be done."""
@@ -58,12 +110,26 @@ class StopSession:
         for _ in range(_TRIES):
             try:
                 address = f"{self._url}/{path}&json=1"
-                answer = self._session.post(address, data=payload, timeout=self._timeout_s)
+                status = self._ask("POST", address, payload)
             except OSError as error:
                 why = type(error).__name__
                 continue
-            return None if answer.ok else f"the controller refuses (HTTP {answer.status_code})"
+            return None if status < _REFUSED else f"the controller refuses (HTTP {status})"
         return why
+
+    def _ask(self, method: str, address: str, payload: dict[str, str] | None = None) -> int:
+        """Return the status of an answer; whatever follows it is not waited for."""
+        answer = self._session.request(
+            method,
+            address,
+            data=payload,
+            timeout=self._timeout_s,
+            allow_redirects=False,
+            stream=True,
+        )
+        if answer.status_code != _NO_CONTENT:
+            answer.close()
+        return int(answer.status_code)
 
 
 def main() -> None:

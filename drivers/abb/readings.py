@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from drivers.abb.plausible import implausible
 from drivers.abb.units import transform_of
+from drivers.errors import DeviceError
 
 
 @dataclass(frozen=True)
@@ -42,16 +45,25 @@ class Reading:
     raw: dict[str, Any]
 
 
-def read_rws(rws: Any, now_s: float, before: Reading | None = None) -> Reading:
+def read_rws(
+    rws: Any,
+    now_s: float,
+    limits_rad: Sequence[tuple[float, float]],
+    before: Reading | None = None,
+) -> Reading:
     """Ask for joints and flange pose, in two requests; they are of one instant if it stands.
 
     Where the joints are what they were in the reading `before`, to the last digit that the
-    controller tells, so is the pose, and it is not asked for again.
+    controller tells, so is the pose, and it is not asked for again. Raises `DeviceError` for what
+    can be no reading of an arm whose joints have the limits `limits_rad`.
     """
     joints = rws.get_jointtarget()
     if before is not None and before.raw.get("jointtarget_deg") == joints.robax.tolist():
         return replace(before, host_t_s=now_s)
     pose = rws.get_robtarget(tool="tool0", wobj="wobj0", coordinate="Base")
+    wrong = implausible(joints.robax.tolist(), pose.trans.tolist(), pose.rot.tolist(), limits_rad)
+    if wrong is not None:
+        raise DeviceError(f"what the controller says of joints and pose cannot be: {wrong}")
     return Reading(
         host_t_s=now_s,
         controller_t_s=None,
@@ -73,5 +85,7 @@ def world_from_base(rws: Any) -> RigidTransform:
     poses = {}
     for frame in ("Base", "World"):
         target = rws.get_robtarget(tool="tool0", wobj="wobj0", coordinate=frame)
+        if not np.isfinite([*target.trans, *target.rot]).all():
+            raise DeviceError("where the controller says that the arm is mounted is not finite")
         poses[frame] = transform_of(target.trans, target.rot)
     return poses["World"] * poses["Base"].inv()

@@ -6,13 +6,19 @@ It sets no time-out on any request, raises a bare `KeyError` for a wrong passwor
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from drivers.abb.guard import session_for
+from drivers.abb.login import Login
 from drivers.abb.settings import ABBSettings
+from drivers.abb.transport import read_whole
 from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable
+from drivers.outside import printable
 
+_LONGEST_S = 5.0  # of one answer, however slowly it comes
 BeforeRequest = Callable[[str, str], None]
 
 
@@ -28,7 +34,7 @@ def open_rws(url: str, settings: ABBSettings, before_request: BeforeRequest | No
     url:
         Such as ``http://192.168.125.1``.
     settings:
-        User, password and time-outs.
+        Login, certificate and time-outs.
     before_request:
         Called with method and URL before each request; may raise `Cancelled`.
     """
@@ -39,19 +45,30 @@ def open_rws(url: str, settings: ABBSettings, before_request: BeforeRequest | No
         raise DeviceRefused(
             f"ABB arm {url}: {error}: pip install 'calibration-cell[abb]'"
         ) from None
-    rws = RWS(url, settings.user, settings.password)
-    # the library offers no other place for a time-out
-    session = rws._session  # noqa: SLF001
+    login = login_in(url, settings)
+    rws = RWS(url, login.user, login.password)
+    session = session_for(settings.certificate_sha256)
     send = session.request
     bounds = (settings.connect_timeout_s, settings.read_timeout_s)
 
     def request(method: str, address: str, **more: Any) -> Any:
         if before_request is not None:
             before_request(method, address)
-        return send(method, address, timeout=bounds, **more)
+        more |= {"timeout": bounds, "stream": True, "allow_redirects": False}
+        deadline_s = time.monotonic() + _LONGEST_S
+        return read_whole(send(method, address, **more), deadline_s)
 
     session.request = request
+    # the library offers no other place for a time-out
+    rws._session = session  # noqa: SLF001
     return rws
+
+
+def login_in(url: str, settings: ABBSettings) -> Login:
+    """Return the login of the settings; raises `DeviceRefused` where there is none."""
+    if settings.login is None:
+        raise DeviceRefused(f"ABB arm {url}: no user name and password were given")
+    return settings.login
 
 
 @contextmanager
@@ -79,8 +96,8 @@ def named(url: str) -> Iterator[None]:
         ) from None
     except KeyError as error:
         raise DeviceRefused(
-            f"ABB arm {url}: unexpected answer (no {error}). Most often the user name or the "
-            "password is wrong"
+            f"ABB arm {url}: unexpected answer (no {printable(str(error))}). "
+            "Most often the user name or the password is wrong"
         ) from None
     except Exception as error:
         raise _refusal(url, error) from None
@@ -91,5 +108,6 @@ def _refusal(url: str, error: Exception) -> DeviceError:
     if code == -1 or "401" in str(error):
         return DeviceRefused(f"ABB arm {url}: user name or password is wrong")
     if code is not None:
-        return DeviceRefused(f"ABB arm {url}: the controller refuses: {error} (code {code})")
-    return DeviceError(f"ABB arm {url}: {error}")
+        said = printable(str(error))
+        return DeviceRefused(f"ABB arm {url}: the controller refuses: {said} (code {code})")
+    return DeviceError(f"ABB arm {url}: {printable(str(error)) or type(error).__name__}")

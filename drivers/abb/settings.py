@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from drivers.abb.login import Login
 
 IRB140_LIMITS_RAD = tuple(
     (math.radians(low), math.radians(high))
@@ -18,8 +20,11 @@ class ABBSettings:
 
     Attributes
     ----------
-    user, password:
-        Of Robot Web Services; ABB's own defaults.
+    login:
+        User name and password of Robot Web Services; nothing is sent without. ABB's own are
+        `drivers.abb.login.FACTORY_LOGIN`.
+    certificate_sha256:
+        Fingerprint of the controller's certificate, where it speaks HTTPS.
     poll_s:
         Between two questions to an arm on its way; see `drivers.abb.pace`. The controller bears
         fewer than twenty requests a second.
@@ -38,8 +43,8 @@ class ABBSettings:
         A target that asks for more is refused.
     """
 
-    user: str = "Default User"
-    password: str = "robotics"
+    login: Login | None = None
+    certificate_sha256: str | None = None
     poll_s: float = 0.2
     silence_s: float = 1.0
     link_watch_s: float | None = 0.6
@@ -49,3 +54,7 @@ class ABBSettings:
     joint_limits_rad: tuple[tuple[float, float], ...] = IRB140_LIMITS_RAD
     max_joint_speed_rad_s: float = 3.14
     max_tcp_speed_m_s: float = 1.0
+
+    def without_link_watch(self) -> ABBSettings:
+        """Return the same for a controller that does not watch the link."""
+        return replace(self, link_watch_s=None)

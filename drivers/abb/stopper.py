@@ -12,10 +12,13 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 from drivers.abb.guard import StopSession
+from drivers.abb.rws import login_in
 from drivers.abb.settings import ABBSettings
 from drivers.errors import DeviceUnreachable
+from drivers.outside import printable
 
 _GUARD = Path(__file__).with_name("guard.py")
 _ANSWER_S = 0.04
@@ -34,14 +37,16 @@ class Stopper:
 
     def __init__(self, url: str, settings: ABBSettings) -> None:
         self._url = url
-        login = {
+        login = login_in(url, settings)
+        options: dict[str, Any] = {
             "url": url,
-            "user": settings.user,
-            "password": settings.password,
+            "user": login.user,
+            "password": login.password,
             "timeout_s": settings.read_timeout_s,
+            "certificate_sha256": settings.certificate_sha256,
         }
-        self._session = StopSession(url, settings.user, settings.password, settings.read_timeout_s)
-        self._login = json.dumps(login)
+        self._session = StopSession(**options)
+        self._login = json.dumps(options)
         self._guard: subprocess.Popen[str] | None = None
         self._asked = threading.Event()
         self._answered = threading.Event()
@@ -54,7 +59,7 @@ class Stopper:
         try:
             self._session.log_in()
         except OSError as error:
-            raise DeviceUnreachable(f"ABB arm {self._url}: {error}") from None
+            raise DeviceUnreachable(f"ABB arm {self._url}: {printable(str(error))}") from None
         self._guard = subprocess.Popen(
             [sys.executable, "-P", str(_GUARD)],
             stdin=subprocess.PIPE,

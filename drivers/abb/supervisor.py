@@ -188,7 +188,8 @@ class Supervisor:
                 self._running = self._rws.get_execution_state().ctrlexecstate == "running"
             self._still = self._still and not self._running
             if not self._running or self._polls % _POSE_EVERY == 0:
-                self._take(read_rws(self._rws, time.monotonic(), self.newest))
+                limits_rad = self._settings.joint_limits_rad
+                self._take(read_rws(self._rws, time.monotonic(), limits_rad, self.newest))
             panel = fault_in(self._rws) if in_turn else None
         if panel is not None:
             self._trip(panel)

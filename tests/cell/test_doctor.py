@@ -103,9 +103,11 @@ def abb() -> Iterator[ABBController]:
         yield controller
 
 
-def abb_cell(folder: Path, controller: ABBController, more: str = "") -> CellFile:
+def abb_cell(
+    folder: Path, controller: ABBController, more: str = "factory_password: true"
+) -> CellFile:
     address = f"{controller.address}:{controller.port}"
-    return cell_with(folder, f"{{driver: abb, model: irb140, address: '{address}'{more}}}")
+    return cell_with(folder, f"{{driver: abb, model: irb140, address: '{address}', {more}}}")
 
 
 def test_an_abb_arm_in_manual_mode_is_named(tmp_path: Path, abb: ABBController) -> None:
@@ -125,13 +127,18 @@ def test_a_controller_that_does_not_watch_the_link_is_named(
     assert "restart the controller" in by_name(examine(abb_cell(tmp_path, abb)), "ABB link").line()
     abb.watch.loaded = False
     assert by_name(examine(abb_cell(tmp_path, abb)), "ABB link watch").blocks
-    without = by_name(examine(abb_cell(tmp_path, abb, ", link_watch: false")), "ABB link watch")
+    without = by_name(
+        examine(abb_cell(tmp_path, abb, "factory_password: true, link_watch: false")),
+        "ABB link watch",
+    )
     assert not without.blocks
     assert "a cut cable stops nothing" in without.line()
 
 
 def test_a_wrong_password_is_named(tmp_path: Path, abb: ABBController) -> None:
-    findings = examine(abb_cell(tmp_path, abb, ", password: wrong"))
+    credentials = tmp_path / "credentials"
+    credentials.write_text("Default User\nwrong\n")
+    findings = examine(abb_cell(tmp_path, abb, f"credentials_file: {credentials}"))
     login = by_name(findings, "ABB login")
     assert login.blocks
     assert "password is wrong" in login.line()
@@ -218,7 +225,7 @@ def test_the_driver_follows_the_cell_file(tmp_path: Path) -> None:
     ur = cell_with(tmp_path, "{driver: ur, model: ur5e, address: 10.0.0.1}")
     abb = cell_with(
         tmp_path,
-        "{driver: abb, model: irb140, address: 10.0.0.1}",
+        "{driver: abb, model: irb140, address: 10.0.0.1, factory_password: true}",
         "{driver: robotiq, address: 10.0.0.1, model: wrist",
     )
     assert isinstance(arm_of(ur), URArm)

@@ -6,10 +6,11 @@ The section `simulation` holds the truth of a simulated cell and is looked at by
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, model_validator
 
 from calib.views import Mount
 from cell.storage.files.board_file import Charuco, Chessboard
@@ -61,15 +62,38 @@ class AbbRobot(SimulatedRobot):
 
     driver: Literal["abb"]  # type: ignore[assignment]
     address: str
-    """Name or IP address of the controller, with `:port` where it is not 80."""
-    user: str = "Default User"
-    password: str = "robotics"
-    """The controller's factory default; give your own where it was changed."""
+    """Name or IP address of the controller, with `:port` where it is neither 443 nor 80. HTTPS is
+    spoken where the controller has it."""
+    credentials_file: Path | None = None
+    """A file of two lines, user name and password; where it is not given, they are taken from the
+    environment: `CELL_ROBOT_USER` and `CELL_ROBOT_PASSWORD`."""
+    factory_password: bool = False
+    """Log in as `Default User` with the password that every controller is delivered with."""
+    certificate_sha256: str | None = Field(default=None, pattern=r"^[0-9A-Fa-f:]{64,95}$")
+    """Fingerprint of the controller's certificate that you compared and trust; needed for HTTPS."""
     link_watch: bool = True
     """The controller stops a motion by itself when this computer falls silent, for which
     `cell_watch.mod` must be loaded there; with false, a cut cable stops nothing."""
     egm_port: int | None = Field(default=None, gt=0, lt=65536)
     """UDP port of this computer where the controller's EGM feedback arrives; null for none."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_password(cls, data: Any) -> Any:
+        # a cell file is copied, mailed and put under version control
+        if isinstance(data, Mapping) and {"user", "password"} & set(data):
+            raise ValueError(
+                "user and password do not belong in a cell file: set CELL_ROBOT_USER and"
+                " CELL_ROBOT_PASSWORD, or name a `credentials_file`, or write"
+                " `factory_password: true`"
+            )
+        return data
+
+    @model_validator(mode="after")
+    def _one_login(self) -> AbbRobot:
+        if self.factory_password and self.credentials_file is not None:
+            raise ValueError("has a credentials_file and factory_password: keep one of them")
+        return self
 
 
 RobotFile = Annotated[SimulatedRobot | UniversalRobot | AbbRobot, Field(discriminator="driver")]

@@ -2,36 +2,44 @@
 
 from __future__ import annotations
 
+from cell.devices.abb_settings import abb_settings
+from cell.errors import InputError
 from cell.storage.files.cell_file import AbbRobot
 from cell.verbs.doctor.finding import Finding
 from cell.verbs.doctor.ports import host_port, port
 from drivers.abb.link_watch import LinkWatch
 from drivers.errors import DeviceError
 
+_PORTS = (443, 80)
+
 
 def abb(robot: AbbRobot) -> list[Finding]:
     """The port of Robot Web Services, login, mode, motors, programs, the watch over the link."""
-    answers = port("ABB Robot Web Services", *host_port(robot.address, 80))
-    return [answers, *_state(robot)] if answers.ready else [answers]
+    host, number = host_port(robot.address, 0)
+    for standard in (number,) if number else _PORTS:
+        answers = port("ABB Robot Web Services", host, standard)
+        if answers.ready:
+            return [answers, *_state(robot)]
+    return [answers]
 
 
 def _state(robot: AbbRobot) -> list[Finding]:
     from drivers.abb.rws import named, open_rws
-    from drivers.abb.settings import ABBSettings
     from drivers.abb.status import fault_in
+    from drivers.abb.transport import resolved
 
-    url = f"http://{robot.address}"
     try:
-        rws = open_rws(url, ABBSettings(robot.user, robot.password))
+        settings = abb_settings(robot)
+        url = resolved(robot.address, robot.certificate_sha256)
+        rws = open_rws(url, settings)
         with named(url):
             fault = fault_in(rws)
             execution = str(rws.get_execution_state().ctrlexecstate)
-    except DeviceError as refusal:
-        mend = "correct what it says; robot.user and robot.password stand in the cell file"
-        return [Finding("ABB login", False, str(refusal), mend)]
-    settings = ABBSettings()
-    watch = LinkWatch(url, rws, settings.link_watch_s if robot.link_watch else None)
+    except (DeviceError, InputError) as refusal:
+        return [Finding("ABB login", False, str(refusal), "correct what it says")]
+    watch = LinkWatch(url, rws, settings.link_watch_s)
     return [
+        _secured(url),
         _link_watch(watch, robot.link_watch),
         Finding("ABB mode and motors", fault is None, fault or "automatic, motors on", "see there"),
         Finding(
@@ -41,6 +49,14 @@ def _state(robot: AbbRobot) -> list[Finding]:
             "stop the RAPID program that runs",
         ),
     ]
+
+
+def _secured(url: str) -> Finding:
+    found = "HTTPS, of a certificate that the cell file trusts"
+    if not url.startswith("https"):
+        found = "HTTP: whoever is on this network can read along and order"
+    mend = "keep the robot on a network of its own; switch HTTPS on where the controller has it"
+    return Finding("ABB link", url.startswith("https"), found, mend, needed=False)
 
 
 def _link_watch(watch: LinkWatch, wanted: bool) -> Finding:

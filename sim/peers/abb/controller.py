@@ -35,6 +35,8 @@ class ABBController:
         A loopback address of its own.
     port:
         For HTTP; the real controller's is 80, which an ordinary user may not open.
+    https:
+        Speak HTTPS on that port, not HTTP.
     egm_port:
         Where to send EGM feedback while a program runs; None for nowhere.
 
@@ -57,11 +59,18 @@ class ABBController:
     """
 
     def __init__(
-        self, arm: Arm, address: str = "127.0.0.1", port: int = 8610, egm_port: int | None = None
+        self,
+        arm: Arm,
+        address: str = "127.0.0.1",
+        port: int = 8610,
+        egm_port: int | None = None,
+        *,
+        https: bool = False,
     ) -> None:
         self.arm = arm
         self.address = address
         self.port = port
+        self._https = https
         self.panel = PanelState()
         self.faults = ABBFaults()
         self.reported = Reported(arm.state, lambda: self.faults)
@@ -81,7 +90,7 @@ class ABBController:
 
     def __enter__(self) -> ABBController:
         self.arm.connect()
-        self._http = RwsServer((self.address, self.port), self)
+        self._http = RwsServer((self.address, self.port), self, https=self._https)
         self.watch.start()
         if self._egm is not None:
             self._egm.start()
@@ -93,7 +102,7 @@ class ABBController:
     @property
     def url(self) -> str:
         """Base URL of Robot Web Services."""
-        return f"http://{self.address}:{self.port}"
+        return f"{'https' if self._https else 'http'}://{self.address}:{self.port}"
 
     # ---- what a test orders ------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ import json
 import threading
 import time
 from http.server import BaseHTTPRequestHandler
+from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
@@ -16,15 +17,18 @@ from sim.peers.abb.digest import DigestLogin
 from sim.peers.abb.resources import Answer, Controller, Resources, error
 from sim.peers.http import DroppableServer
 
+CERTIFICATE = Path(__file__).with_name("certificate.pem")
 _POLL_S = 0.02
 
 
 class RwsServer:
     """Serves RWS clients of one controller."""
 
-    def __init__(self, address: tuple[str, int], controller: Controller) -> None:
+    def __init__(
+        self, address: tuple[str, int], controller: Controller, *, https: bool = False
+    ) -> None:
         handler = type("Handler", (_Handler,), {"resources": Resources(controller)})
-        self._server = DroppableServer(address, handler)
+        self._server = DroppableServer(address, handler, certificate=CERTIFICATE if https else None)
         self._thread = threading.Thread(
             target=self._server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True
         )
@@ -84,9 +88,10 @@ class _Handler(BaseHTTPRequestHandler):
         if answer.status == 401:
             self.send_header("WWW-Authenticate", self._login.challenge)
         binary = isinstance(answer.body, bytes)
-        self.send_header(
-            "Content-Type", "application/octet-stream" if binary else "application/json"
-        )
+        kind = answer.kind or ("application/octet-stream" if binary else "application/json")
+        self.send_header("Content-Type", kind)
+        for name, value in answer.headers:
+            self.send_header(name, value)
         self.send_header("Set-Cookie", "-http-session-=1::http.session::1; path=/")
         if answer.status != 204:
             self.send_header("Content-Length", str(len(content)))

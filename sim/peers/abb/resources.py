@@ -30,6 +30,9 @@ class Answer:
 
     status: int
     body: Any = b""
+    kind: str | None = None
+    """Content type, where it does not follow from the body."""
+    headers: tuple[tuple[str, str], ...] = ()
 
 
 def state(*entries: dict[str, Any]) -> Answer:

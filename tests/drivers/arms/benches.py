@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from calib.chain.kinematics import arm as kinematics_of
-from drivers.abb import ABBArm, ABBSettings
+from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings
 from drivers.arm import Arm, ArmState, Motion, MoveTarget
 from drivers.errors import DeviceUnreachable, StopFailed
 from drivers.ur import URArm, URSettings
@@ -130,7 +130,7 @@ def abb_bench(egm: bool = False) -> Iterator[Bench]:
     port = free_udp_port() if egm else None
     with ExitStack() as stack:
         controller, sim = stack.enter_context(abb_peer(port))
-        arm = ABBArm(controller.url, ABBSettings(egm_port=port))
+        arm = ABBArm(controller.url, ABBSettings(login=FACTORY_LOGIN, egm_port=port))
         stack.callback(arm.close)
         yield Bench(
             arm,

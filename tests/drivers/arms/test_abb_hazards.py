@@ -28,7 +28,7 @@ from benches import (
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.chain.kinematics import arm as kinematics_of
-from drivers.abb import ABBArm, ABBSettings, link_watch
+from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings, Login, link_watch
 from drivers.abb.program import build_program
 from drivers.abb.readings import Reading
 from drivers.arm import Motion, MoveTarget
@@ -36,6 +36,7 @@ from drivers.errors import ArmStopped, DeviceError, DeviceRefused, DeviceUnreach
 from sim.peers.abb.motion_program import decode
 
 GOAL_S = 0.1
+LOGGED_IN = ABBSettings(login=FACTORY_LOGIN)
 LINK_WATCH_S = ABBSettings().link_watch_s
 FAR = tuple(angle + 0.6 for angle in ABB_HOME)
 MOUNTED = RigidTransform.from_components([0.5, -0.2, 1.0], Rotation.from_rotvec([0, 0.3, 1.2]))
@@ -47,7 +48,7 @@ def connected(egm=False, **settings):
     with abb_peer(port) as (controller, sim):
         controller.world_from_base = MOUNTED
         controller.flange_from_active_tool = RigidTransform.from_translation([0, 0, 0.2])
-        arm = ABBArm(controller.url, ABBSettings(egm_port=port, **settings))
+        arm = ABBArm(controller.url, ABBSettings(login=FACTORY_LOGIN, egm_port=port, **settings))
         try:
             arm.connect()
             yield arm, controller, sim
@@ -100,8 +101,8 @@ def test_a_stop_at_any_instant_of_a_start_leaves_the_arm_standing(seed):
 _MOVE_AND_WAIT = """
 import sys, time
 from drivers.arm import MoveTarget
-from drivers.abb import ABBArm
-arm = ABBArm(sys.argv[1])
+from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings
+arm = ABBArm(sys.argv[1], ABBSettings(login=FACTORY_LOGIN))
 arm.connect()
 arm.start_move(MoveTarget(joints_rad=tuple(map(float, sys.argv[2:])), joint_speed_rad_s=0.2,
                           tcp_speed_m_s=0.5))
@@ -217,8 +218,8 @@ def test_nothing_moves_where_the_controller_does_not_watch_the_link(part, words)
     with abb_peer() as (controller, _):
         setattr(controller.watch, part, False)
         with pytest.raises(DeviceRefused, match=words):
-            ABBArm(controller.url).connect()
-        ABBArm(controller.url, ABBSettings(link_watch_s=None)).connect()
+            ABBArm(controller.url, LOGGED_IN).connect()
+        ABBArm(controller.url, ABBSettings(login=FACTORY_LOGIN, link_watch_s=None)).connect()
 
 
 def test_nobody_is_watched_while_the_arm_stands():
@@ -245,7 +246,7 @@ def test_a_wrong_password_is_told_as_such():
         abb_peer() as (controller, _),
         pytest.raises(DeviceRefused, match="password"),
     ):
-        ABBArm(controller.url, ABBSettings(password="guess")).connect()
+        ABBArm(controller.url, ABBSettings(login=Login("Default User", "guess"))).connect()
 
 
 @pytest.mark.parametrize(
@@ -271,7 +272,7 @@ def test_a_running_rapid_program_is_not_disturbed():
     with abb_peer() as (controller, _):
         controller.running = True
         with pytest.raises(DeviceRefused, match="RAPID program is running"):
-            ABBArm(controller.url).connect()
+            ABBArm(controller.url, LOGGED_IN).connect()
 
 
 def test_a_move_that_rapid_cannot_make_is_a_fault_with_its_words():
@@ -285,7 +286,7 @@ def test_a_move_that_rapid_cannot_make_is_a_fault_with_its_words():
 
 def test_nobody_there_is_told_as_such():
     with pytest.raises(DeviceUnreachable, match="OmniCore"):
-        ABBArm("http://127.255.255.254:8610").connect()
+        ABBArm("http://127.255.255.254:8610", LOGGED_IN).connect()
 
 
 def test_the_controller_is_asked_fewer_than_twenty_times_a_second():
@@ -326,7 +327,7 @@ def test_egm_tells_joints_and_flange_pose_of_one_instant_on_the_way():
 
 def test_an_egm_port_in_use_is_told_as_such():
     with connected(egm=True) as (arm, controller, _):
-        settings = ABBSettings(egm_port=arm._settings.egm_port)
+        settings = ABBSettings(login=FACTORY_LOGIN, egm_port=arm._settings.egm_port)
         with pytest.raises(DeviceRefused, match="UDP port"):
             ABBArm(controller.url, settings).connect()
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from benches import ABB_HOME, UR_FAR, abb_peer, slowly, stays, truly_moving, until, ur_peer
 
-from drivers.abb import ABBSettings
+from drivers.abb import FACTORY_LOGIN, ABBSettings
 from drivers.abb.guard import StopSession
 from drivers.abb.rws import open_rws
 from drivers.errors import DeviceUnreachable
@@ -149,7 +149,7 @@ def test_old_readings_let_the_clock_go_on():
 
 def test_old_readings_come_through_robot_web_services_too():
     with abb_moving() as (controller, sim, _):
-        rws = open_rws(controller.url, ABBSettings())
+        rws = open_rws(controller.url, ABBSettings(login=FACTORY_LOGIN))
         rws.get_jointtarget()
         controller.faults.old_readings = True
         before = rws.get_jointtarget().robax.tolist()
