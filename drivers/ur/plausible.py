@@ -8,7 +8,7 @@ from drivers.ur.runtime import Runtime
 from drivers.ur.wire import Value
 
 _FARTHEST_JOINT_RAD = 7.0  # 363 degrees and a margin
-_FARTHEST_M = 100.0
+_FARTHEST_M = 1e4  # a tool given in millimetres lies within; `cell doctor` names it
 
 
 def implausible(values: dict[str, Value]) -> str | None:
