@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import sys
-import warnings
 from collections.abc import Callable
 
 import typer
@@ -56,8 +55,6 @@ for name, verb in VERBS.items():
 def main() -> None:
     """Run the command line and leave with the contract's exit status."""
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s: %(message)s")
-    # Debian's own matplotlib shadows the 3-D axes of ours, which nothing here draws
-    warnings.filterwarnings("ignore", message="Unable to import Axes3D")
     prepare(sys.argv[1:])
     try:
         app()

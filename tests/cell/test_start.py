@@ -28,6 +28,7 @@ def test_help_is_shown_without_a_single_heavy_library() -> None:
     ("module", "names"),
     [
         ("cell.verbs.export", ("numba", "scipy", "matplotlib", "cv2")),
+        ("cell.views.report", ("matplotlib", *STATISTICS)),
         ("calib.calibration", STATISTICS),
         ("calib.discovery.diagnose", STATISTICS),
     ],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +11,9 @@ from cell.errors import InputError
 from cell.verbs.compare.comparison import Comparison, Difference
 from cell.verbs.compare.messages import HEAD, TITLES, parts, table, verdict
 from cell.views.report import html
-from cell.views.report.figures.canvas import BLACK, panels
+from cell.views.report.figures.canvas import BLACK
+from cell.views.report.plot import Figure, panels
 from cell.views.report.sections.drawing import drawing
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def write_page(path: Path, comparison: Comparison) -> None:
@@ -70,14 +67,9 @@ def draw(comparison: Comparison, part: Difference) -> Figure:
     for ax, k in zip(axes, (0, -1), strict=True):
         arrows = part.map_px[k]
         length = np.linalg.norm(arrows, axis=1)
-        shade = ax.scatter(
-            pixels[:, 0], pixels[:, 1], c=length, cmap="cividis_r", vmin=0, s=60, marker="s"
-        )
-        ax.quiver(
-            *pixels.T, *arrows.T, angles="xy", scale_units="xy", color=BLACK, width=0.004,
-            scale=max(float(length.max()), 1e-9) / (width / 9),
-        )  # fmt: skip
-        ax.set(xlim=(0, width), ylim=(height, 0), aspect="equal", xlabel="u (px)", ylabel="v (px)")
-        ax.set_title(f"at {comparison.field.distances_m[k]:.3f} m")
-        figure.colorbar(shade, ax=ax, shrink=0.6, pad=0.02).set_label("difference (px)")
+        ax.squares(pixels, length, size=7.7, name="difference (px)")
+        ax.quiver(pixels, arrows, unit=max(float(length.max()), 1e-9), length=width / 9,
+                  colors=[BLACK] * len(pixels))  # fmt: skip
+        ax.set(xlim=(0, width), ylim=(height, 0), aspect="box", xlabel="u (px)", ylabel="v (px)")
+        ax.set(title=f"at {comparison.field.distances_m[k]:.3f} m")
     return figure

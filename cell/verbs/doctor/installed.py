@@ -21,7 +21,6 @@ _ALWAYS = (
     "opencv-python-headless",
     "pydantic",
     "ruamel.yaml",
-    "matplotlib",
     "starlette",
     "uvicorn",
 )

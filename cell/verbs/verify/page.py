@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +20,10 @@ from cell.verbs.verify.messages import (
 )
 from cell.verbs.verify.misfit import Misfit
 from cell.views.report import html
-from cell.views.report.figures.canvas import BLACK, panels
+from cell.views.report.figures.canvas import BLACK
+from cell.views.report.plot import Figure, panels
+from cell.views.report.plot.colours import colours
 from cell.views.report.sections.drawing import drawing
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _STYLE = {"good": "good", "cannot_tell": "note-worthy"}
 
@@ -135,16 +133,18 @@ def draw(judgement: Judgement, misfit: Misfit) -> Figure:
     seen = np.isfinite(off).all(axis=2)
     at, arrows = views.corners_px[seen], off[seen]
     length = np.linalg.norm(arrows, axis=1)
-    image.quiver(
-        *at.T, *arrows.T, length, angles="xy", scale_units="xy", cmap="cividis_r", width=0.003,
-        scale=max(float(np.quantile(length, 0.95)), 1e-9) / (views.width_px / 15),
-    )  # fmt: skip
-    image.set(xlim=(0, views.width_px), ylim=(views.height_px, 0), aspect="equal")
+    long = max(float(np.quantile(length, 0.95)), 1e-9)
+    image.quiver(at, arrows, unit=long, length=views.width_px / 15,
+                 colors=colours(length, "cividis_r", 0.0, float(length.max())))  # fmt: skip
+    image.set(xlim=(0, views.width_px), ylim=(views.height_px, 0), aspect="box")
     image.set(xlabel="u (px)", ylabel="v (px)")
     rms = np.sqrt(np.nanmean((off**2).sum(axis=2), axis=1))
     allowed = np.sqrt(np.nanmean((misfit.allowed_px**2).sum(axis=2), axis=1))
-    distance.plot(misfit.distance_m, rms, "o", color=BLACK, label="misfit")
-    distance.plot(misfit.distance_m, allowed, "_", color=BLACK, ms=14, label="allowed, one sigma")
-    distance.set(xlabel="distance (m)", ylabel="RMS (px)", ylim=(0, None))
-    distance.legend(frameon=False)
+    look = {"linestyle": "", "color": BLACK}
+    distance.plot(misfit.distance_m, rms, marker="o", label="misfit", **look)
+    distance.plot(misfit.distance_m, allowed, marker="_", markersize=14.0,
+                  label="allowed, one sigma", **look)  # fmt: skip
+    top = 1.3 * float(np.nanmax([rms, allowed]))
+    distance.set(xlabel="distance (m)", ylabel="RMS (px)", ylim=(0, top))
+    distance.legend_at = "upper left"
     return figure

@@ -5,17 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from calib.views import FloatArray
 from cell.views.report.data import ReportData
 from cell.views.report.evidence.scatter import WITH, WITHOUT, before_after, component, shifts_m
-from cell.views.report.figures.canvas import BLUE, ORANGE, legend_below, panels
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cell.views.report.figures.canvas import BLUE, ORANGE
+from cell.views.report.plot import Figure, legend_below, panels
 
 _AXES = "xyz"
 
@@ -45,7 +43,7 @@ def error_against_joints(data: ReportData, effect: Mapping[str, Any]) -> Figure 
         mark = " — named" if hurt == joint + 1 else ""
         ax.set(title=f"joint {joint + 1}{mark}", xlabel="angle (°)")
     for row in range(rows):
-        axes[3 * row].set_ylabel(f"{_AXES[axis]} error (mm)")
+        axes[3 * row].set(ylabel=f"{_AXES[axis]} error (mm)")
     legend_below(figure, axes)
     return figure
 
@@ -66,10 +64,10 @@ def error_against_approach(data: ReportData, effect: Mapping[str, Any]) -> Figur
         for sign, marker, colour, words in ((1, "^", ORANGE, "below"), (-1, "v", BLUE, "above")):
             chosen = came[:, joint] == sign
             ax.plot(np.degrees(views.joints_rad[chosen, joint]), shift[chosen, axis] * 1e3,
-                    marker, color=colour, fillstyle="none",
+                    marker=marker, linestyle="", color=colour, fillstyle="none",
                     label=f"joint came from {words}")  # fmt: skip
         ax.set(title=name, xlabel=f"joint {joint + 1} (°)")
-    axes[0].set_ylabel(f"{_AXES[axis]} error (mm)")
+    axes[0].set(ylabel=f"{_AXES[axis]} error (mm)")
     legend_below(figure, axes)
     return figure
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +12,9 @@ from calib.chain.model import CellModel, start
 from calib.chain.optics import optics_row
 from calib.views import FloatArray
 from cell.views.report.data import ReportData
-from cell.views.report.figures.canvas import BLACK, panels
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cell.views.report.figures.canvas import BLACK
+from cell.views.report.plot import Figure, panels
+from cell.views.report.plot.axes import Limits
 
 
 def shape(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
@@ -29,17 +28,16 @@ def shape(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
     corners = board.corners_m * 1e3
     figure, (height, plane) = panels(9.2, 3.2, columns=2)
     limit = max(float(np.nanmax(np.abs(offset[:, 2]))) * 1e3, 1e-6)
-    drawn = height.imshow(
-        offset[:, 2].reshape(board.rows, board.cols) * 1e3, cmap="PuOr", vmin=-limit, vmax=limit,
-        extent=_extent(corners, board.square_m * 1e3), aspect="equal",
+    across, down = _extent(corners, board.square_m * 1e3)
+    height.image(
+        offset[:, 2].reshape(board.rows, board.cols) * 1e3, across, down, colormap="PuOr",
+        limits=(-limit, limit), name="z (mm)",
     )  # fmt: skip
     height.set(title="height, away from the viewer", xlabel="x (mm)", ylabel="y (mm)")
-    figure.colorbar(drawn, ax=height, shrink=0.8).set_label("z (mm)")
-    arrows = plane.quiver(*corners[:, :2].T, *(offset[:, :2].T * 1e3), angles="xy", color=BLACK)
     key = float(f"{np.nanmax(np.hypot(*offset[:, :2].T)) * 1e3 or 1.0:.1g}")
-    plane.quiverkey(arrows, 0.85, 1.05, key, f"{key:g} mm", labelpos="E", coordinates="axes")
-    plane.set(title="shift in the plane", xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
-    plane.invert_yaxis()
+    plane.quiver(corners[:, :2], offset[:, :2] * 1e3, unit=key, length=board.square_m * 1e3,
+                 colors=[BLACK] * len(corners), key=f"{key:g} mm")  # fmt: skip
+    plane.set(title="shift in the plane", xlabel="x (mm)", ylabel="y (mm)", aspect="box", down=True)
     return figure
 
 
@@ -60,6 +58,6 @@ def _law(effect: Mapping[str, Any]) -> dict[str, str]:
     return {"law": str(effect["law"])} if effect.get("law") else {}
 
 
-def _extent(corners_mm: np.ndarray, square_mm: float) -> tuple[float, float, float, float]:
+def _extent(corners_mm: np.ndarray, square_mm: float) -> tuple[Limits, Limits]:
     low, high = corners_mm.min(axis=0) - square_mm / 2, corners_mm.max(axis=0) + square_mm / 2
-    return float(low[0]), float(high[0]), float(high[1]), float(low[1])
+    return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))

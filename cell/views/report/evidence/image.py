@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cell.views.report.data import ReportData
-from cell.views.report.figures.canvas import panels
 from cell.views.report.figures.residuals import cells, field
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Figure, panels
 
 
 def before_and_after(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
@@ -30,5 +27,5 @@ def before_and_after(data: ReportData, effect: Mapping[str, Any]) -> Figure | No
     figure, axes = panels(9.2, 3.2, columns=len(shown))
     for ax, (name, residual) in zip(axes, shown, strict=True):
         field(ax, data.views, residual, key)
-        ax.set_title(name)
+        ax.set(title=name)
     return figure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +17,10 @@ from cell.views.report.evidence.scatter import (
     component,
     shifts_m,
 )
-from cell.views.report.figures.canvas import BLACK, BLUE, GREY, ORANGE, legend_below, panels
+from cell.views.report.figures.canvas import BLACK, BLUE, GREY, ORANGE
 from cell.views.report.figures.scale_factors import law_px
 from cell.views.report.geometry import frame_distance_m
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Axes, Figure, legend_below, panels
 
 
 def alpha_and_depth(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
@@ -54,10 +51,10 @@ def by_focus_direction(data: ReportData, effect: Mapping[str, Any]) -> Figure | 
     for ax, (name, shift) in zip(axes, shown, strict=True):
         for sign, marker, colour, words in ((1, "^", ORANGE, "rising"), (-1, "v", BLUE, "falling")):
             chosen = np.sign(came) == sign
-            ax.plot(distance[chosen], shift[chosen, 2] * 1e3, marker, color=colour,
-                    fillstyle="none", label=f"focus {words}")  # fmt: skip
+            ax.plot(distance[chosen], shift[chosen, 2] * 1e3, marker=marker, linestyle="",
+                    color=colour, fillstyle="none", label=f"focus {words}")  # fmt: skip
         ax.set(title=name, xlabel="distance (m)")
-    axes[0].set_ylabel("depth error (mm)")
+    axes[0].set(ylabel="depth error (mm)")
     legend_below(figure, axes)
     return figure
 
@@ -69,7 +66,7 @@ def by_exposure(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
         return None
     figure, axes = panels(6.0, 3.2)
     _depth(axes[0], shifts, exposure_ms)
-    axes[0].set_xlabel("exposure (ms)")
+    axes[0].set(xlabel="exposure (ms)")
     legend_below(figure, axes)
     return figure
 
@@ -79,8 +76,8 @@ def _alpha(ax: Axes, data: ReportData, effect: Mapping[str, Any], distance: np.n
     assert found is not None
     assert found.alpha_px is not None
     sigma = np.zeros(len(distance)) if found.alpha_sigma_px is None else found.alpha_sigma_px
-    ax.errorbar(distance, found.alpha_px, np.nan_to_num(sigma), fmt="x", color=BLACK, ecolor=GREY,
-                label="α at the robot's depth, ± 1σ")  # fmt: skip
+    ax.errorbar(distance, found.alpha_px, np.nan_to_num(sigma), marker="x", color=BLACK,
+                ecolor=GREY, label="α at the robot's depth, ± 1σ")  # fmt: skip
     grid = np.linspace(np.nanmin(distance), np.nanmax(distance), 120)
     curve = law_px(_with_base(effect, data), grid)
     if curve is not None:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cell.views.report.data import ReportData
 from cell.views.report.evidence.scatter import before_after, shifts_m, size_mm
-from cell.views.report.figures.canvas import legend_below, panels
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Figure, legend_below, panels
 
 
 def error_against_speed(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:

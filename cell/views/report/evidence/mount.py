@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from calib.views import FloatArray
 from cell.views.report.data import ReportData
 from cell.views.report.evidence.scatter import before_after, component, shifts_m, turns_rad
-from cell.views.report.figures.canvas import legend_below, panels
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Figure, legend_below, panels
 
 
 def error_against_gravity(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
@@ -28,8 +25,8 @@ def error_against_gravity(data: ReportData, effect: Mapping[str, Any]) -> Figure
     figure, axes = panels(9.2, 2.9, columns=3)
     for ax, (axis, along) in zip(axes, _most_alike(errors[0], gravity), strict=False):
         before_after(ax, gravity[:, along], errors, partial(component, axis=axis))
-        ax.set_xlabel(f"gravity along the camera's {'xyz'[along]} (g)")
-        ax.set_ylabel(f"{word} {'xyz'[axis]} ({unit})")
+        ax.set(xlabel=f"gravity along the camera's {'xyz'[along]} (g)")
+        ax.set(ylabel=f"{word} {'xyz'[axis]} ({unit})")
     legend_below(figure, axes)
     return figure
 

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from calib.views import FloatArray, Views
 from cell.views.report.data import ReportData
 from cell.views.report.evidence.scatter import before_after, component, shifts_m, size_mm
-from cell.views.report.figures.canvas import legend_below, panels
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Figure, legend_below, panels
 
 _NAMED = 6
 
@@ -29,7 +26,7 @@ def drift(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
     for axis, ax in enumerate(axes):
         before_after(ax, x, shifts, partial(component, axis=axis))
         ax.set(title="xyz"[axis], xlabel=label)
-    axes[0].set_ylabel("error (mm)")
+    axes[0].set(ylabel="error (mm)")
     legend_below(figure, axes)
     return figure
 
@@ -44,8 +41,8 @@ def by_frame(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
     before_after(ax, data.views.frame.astype(float), shifts, size_mm, trend=False)
     worst = np.argsort(-np.nan_to_num(before))[:_NAMED]
     for index in worst[before[worst] > 5 * np.nanmedian(before)]:
-        ax.annotate(str(data.views.frame[index]), (data.views.frame[index], before[index]),
-                    xytext=(4, 2), textcoords="offset points", fontsize=8)  # fmt: skip
+        frame = int(data.views.frame[index])
+        ax.annotate(str(frame), frame, float(before[index]), right=4, up=2)
     ax.set(xlabel="frame", ylabel="position error (mm)")
     legend_below(figure, [ax])
     return figure

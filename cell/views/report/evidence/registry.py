@@ -7,13 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cell.views.report.data import ReportData
 from cell.views.report.evidence import arm, board, image, lens, motion, mount, order
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Figure
 
 Draw = Callable[[ReportData, Mapping[str, Any]], "Figure | None"]
 

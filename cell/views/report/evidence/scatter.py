@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from calib.views import FloatArray
 from cell.views.report.data import ReportData
 from cell.views.report.figures.canvas import BLUE, VERMILLION
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
+from cell.views.report.plot import Axes
 
 Pair = tuple[FloatArray, FloatArray | None]
 """Errors without an effect, and with it where that was measured."""

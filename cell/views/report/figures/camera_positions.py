@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from calib.views import FloatArray
 from cell.views.report.data import ReportData
-from cell.views.report.figures.canvas import BLACK, GREY, legend_below, panels, style
+from cell.views.report.figures.canvas import BLACK, GREY, style
 from cell.views.report.geometry import reference
 from cell.views.report.numbers import solution_name
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Axes, Figure, legend_below, panels
 
 _NUMBERED = 20
 
@@ -29,10 +24,8 @@ def draw(data: ReportData) -> Figure | None:
         _board(ax, data, axis)
         for name in dict.fromkeys(shown):
             _solution(ax, data, str(name), axis)
-        ax.set_aspect("equal", adjustable="datalim")
-        ax.invert_yaxis()
-        ax.set(title=title, ylabel=f"{'xy'[axis]} along the board (mm)")
-        ax.set_xlabel("distance from the board (mm)")
+        ax.set(aspect="limits", down=True, title=title, ylabel=f"{'xy'[axis]} along the board (mm)")
+        ax.set(xlabel="distance from the board (mm)")
     legend_below(figure, axes, columns=4)
     return figure
 
@@ -40,25 +33,27 @@ def draw(data: ReportData) -> Figure | None:
 def _board(ax: Axes, data: ReportData, axis: int) -> None:
     edge = data.views.board.corners_m[:, axis] * 1e3
     ends = [edge.min(), edge.max()]
-    ax.plot([0, 0], ends, color=BLACK, linewidth=5, solid_capstyle="butt", label="board")
+    ax.plot([0, 0], ends, color=BLACK, linewidth=5, label="board")
 
 
 def _solution(ax: Axes, data: ReportData, name: str, axis: int) -> None:
     poses = data.poses[name]
     at = _plane_mm(poses.board_from_camera, axis)
     look = {**style(name), "linestyle": ""}
-    ax.plot(*at.T, label=solution_name(name), fillstyle="none", zorder=3, **look)
+    words = solution_name(name)
+    ax.plot(*at.T, label=words, fillstyle="none", zorder=3, **look)
     true, whose = reference(data, poses)
     if true is None:
         return
     where = _plane_mm(true, axis)
-    pairs = np.stack([where, at], axis=1).T
-    ax.plot(*pairs, color=look["color"], linewidth=0.7, alpha=0.6)
-    ax.plot(*where.T, "*", color=BLACK, markersize=6, label=f"by {whose}", zorder=1)
+    pairs = np.stack([where, at, np.full(at.shape, np.nan)], axis=1)
+    ax.plot(*pairs.reshape(-1, 2).T, color=look["color"], linewidth=0.7, alpha=0.6)
+    ax.plot(
+        *where.T, marker="*", linestyle="", color=BLACK, markersize=6, label=f"by {whose}", zorder=1
+    )
     if len(at) <= _NUMBERED:
         for frame, place in zip(data.views.frame, where, strict=True):
-            ax.annotate(str(frame), place, xytext=(4, 2), textcoords="offset points", fontsize=7,
-                        color=GREY)  # fmt: skip
+            ax.annotate(str(frame), *place, right=4, up=2, size=7, color=GREY)
 
 
 def _plane_mm(board_from_camera: FloatArray, axis: int) -> FloatArray:

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from cell.views.report.data import ReportData
-from cell.views.report.figures.canvas import BLUE, panels
+from cell.views.report.figures.canvas import BLUE
 from cell.views.report.geometry import best_poses, distance_m, tilt_direction_rad, tilt_rad
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Axes, Figure, panels
 
 
 def draw(data: ReportData) -> Figure | None:
@@ -48,31 +43,34 @@ def _counts(data: ReportData, columns: int, rows: int) -> np.ndarray[tuple[int, 
 def _image(ax: Axes, data: ReportData) -> None:
     views = data.views
     counts = np.where((found := _counts(data, 24, 18)) > 0, found, np.nan)
-    shown = ax.imshow(counts, extent=(0, views.width_px, views.height_px, 0), cmap="cividis_r",
-                      vmin=0, aspect="equal")  # fmt: skip
+    ax.image(counts, (0, views.width_px), (0, views.height_px), colormap="cividis_r",
+             limits=(0, float(np.nanmax(counts))), name="corners")  # fmt: skip
     ax.set(title="corners over the image", xlabel="u (px)", ylabel="v (px)")
-    ax.grid(visible=False)
-    ax.figure.colorbar(shown, ax=ax, shrink=0.8, pad=0.02).set_label("corners")
 
 
 def _distances(ax: Axes, data: ReportData, board_from_camera: np.ndarray) -> None:
-    from matplotlib.ticker import MaxNLocator
-
     distance = distance_m(board_from_camera, data.views.board)
-    ax.hist(distance[np.isfinite(distance)], bins=12, color=BLUE, edgecolor="white")
-    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    frames, edges = np.histogram(distance[np.isfinite(distance)], bins=12)
+    ax.bars(edges, frames.astype(np.float64), BLUE)
     ax.set(title="distances", xlabel="distance (m)", ylabel="frames")
 
 
 def _tilts(ax: Axes, board_from_camera: np.ndarray) -> None:
     tilt = np.degrees(tilt_rad(board_from_camera))
     direction = tilt_direction_rad(board_from_camera)
-    ax.plot(tilt * np.cos(direction), tilt * np.sin(direction), "o", color=BLUE, fillstyle="none")
+    ax.plot(
+        tilt * np.cos(direction),
+        tilt * np.sin(direction),
+        marker="o",
+        linestyle="",
+        color=BLUE,
+        fillstyle="none",
+    )
     limit = 1.1 * max(10.0, float(np.nanmax(tilt)))
     for ring in (10, 20, 30, 45, 60):
         if ring < limit:
             turn = np.linspace(0, 2 * np.pi, 90)
             ax.plot(ring * np.cos(turn), ring * np.sin(turn), color="#c6cbd2", linewidth=0.7)
-            ax.annotate(f"{ring}°", (0, ring), fontsize=7, color="#5b616b", ha="center")
-    ax.set(title="tilts", aspect="equal", xlim=(-limit, limit), ylim=(-limit, limit),
+            ax.annotate(f"{ring}°", 0, ring, size=7, color="#5b616b", anchor="middle")
+    ax.set(title="tilts", aspect="box", xlim=(-limit, limit), ylim=(-limit, limit),
            xlabel="along x (°)", ylabel="along y (°)")  # fmt: skip

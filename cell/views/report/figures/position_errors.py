@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from calib.views import FloatArray
 from cell.views.report.data import ReportData, in_order
-from cell.views.report.figures.canvas import legend_below, panels, style
+from cell.views.report.figures.canvas import style
 from cell.views.report.geometry import position_error_m, reference
 from cell.views.report.numbers import solution_name
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Figure, legend_below, panels
 
 _ZOOM = 5.0
 
@@ -45,10 +41,10 @@ def draw(data: ReportData) -> Figure | None:
                 ax.plot(data.views.frame, errors[name][:, axis], label=solution_name(name),
                         fillstyle="none", **look)  # fmt: skip
             ax.axhline(0, color="#5b616b", linewidth=0.8)
-            ax.set_title("xyz"[axis] + (" — enlarged" if row else ""))
-        axes[3 * (rows - 1) + axis].set_xlabel("frame")
+            ax.set(title="xyz"[axis] + (" — enlarged" if row else ""))
+        axes[3 * (rows - 1) + axis].set(xlabel="frame")
     for row in range(rows):
-        axes[3 * row].set_ylabel("error (mm)")
+        axes[3 * row].set(ylabel="error (mm)")
     legend_below(figure, axes)
     return figure
 

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from calib.views import FloatArray, Views
 from cell.views.report.data import ReportData
-from cell.views.report.figures.canvas import BLACK, BLUE, VERMILLION, panels
+from cell.views.report.figures.canvas import BLACK, BLUE, VERMILLION
 from cell.views.report.numbers import solution_name
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Axes, Figure, panels
 
 _COLUMNS = 14
 
@@ -25,7 +20,7 @@ def draw(data: ReportData, name: str) -> Figure | None:
         return None
     figure, axes = panels(9.2, 3.3, columns=2, width_ratios=[1.45, 1])
     field(axes[0], data.views, residual)
-    axes[0].set_title(solution_name(name))
+    axes[0].set(title=solution_name(name))
     _histogram(axes[1], residual)
     return figure
 
@@ -49,22 +44,14 @@ def cells(views: Views, residual_px: FloatArray) -> tuple[FloatArray, FloatArray
 def field(ax: Axes, views: Views, residual_px: FloatArray, key_px: float | None = None) -> None:
     """Draw the mean residual of each image cell as an arrow, its RMS as a shade."""
     centre, mean, rms = cells(views, residual_px)
-    ax.set(xlim=(0, views.width_px), ylim=(views.height_px, 0), aspect="equal",
+    ax.set(xlim=(0, views.width_px), ylim=(views.height_px, 0), aspect="box",
            xlabel="u (px)", ylabel="v (px)", title="mean residual over the image")  # fmt: skip
     if not len(centre):
         return
-    shade = ax.scatter(
-        centre[:, 0], centre[:, 1], c=rms, cmap="cividis_r", vmin=0, s=70, marker="s", alpha=0.85,
-        linewidths=0,
-    )  # fmt: skip
+    ax.squares(centre, rms, size=8.4, name="RMS (px)")
     unit = key_px or _round(float(np.quantile(np.hypot(*mean.T), 0.9)))
-    arrows = ax.quiver(
-        *centre.T, *mean.T, angles="xy", scale_units="xy", width=0.004, color=BLACK,
-        scale=unit / (0.9 * views.width_px / _COLUMNS),
-    )  # fmt: skip
-    ax.quiverkey(arrows, 0.88, 1.05, unit, f"{unit:g} px", labelpos="E", coordinates="axes")
-    colours = ax.figure.colorbar(shade, ax=ax, shrink=0.8, pad=0.02)
-    colours.set_label("RMS (px)")
+    ax.quiver(centre, mean, unit=unit, length=0.9 * views.width_px / _COLUMNS,
+              colors=[BLACK] * len(mean), key=f"{unit:g} px")  # fmt: skip
 
 
 def _histogram(ax: Axes, residual: FloatArray) -> None:
@@ -73,16 +60,17 @@ def _histogram(ax: Axes, residual: FloatArray) -> None:
     looks = ((0, BLUE, "-", "u"), (1, VERMILLION, "--", "v"))
     for axis, colour, line, name in looks:
         values = residual[..., axis][np.isfinite(residual[..., axis])]
-        ax.hist(values, edges.tolist(), density=True, histtype="step", color=colour, linestyle=line,
-                linewidth=1.3, label=f"{name}: σ {values.std():.2g} px")  # fmt: skip
+        density = np.histogram(values, edges, density=True)[0]
+        ax.steps(edges, density, color=colour, linestyle=line, linewidth=1.3,
+                 label=f"{name}: σ {values.std():.2g} px")  # fmt: skip
     # the middle of the residuals says how wide the bell would be without outliers
     middle = 1.4826 * float(np.nanmedian(np.abs(residual))) or limit
     bell = np.exp(-0.5 * (edges / middle) ** 2) / (np.sqrt(2 * np.pi) * middle)
     ax.plot(edges, bell, color="#5b616b", linewidth=1,
             label=f"normal, robust σ {middle:.2g} px")  # fmt: skip
     ax.set(title="histogram", xlabel="residual (px)", ylabel="density (1/px)")
-    ax.set_ylim(top=ax.get_ylim()[1] * 1.35)
-    ax.legend(loc="upper left", fontsize=8)
+    ax.head_room(0.35)
+    ax.legend_at = "upper left"
 
 
 def _round(value: float) -> float:

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from calib.views import FloatArray
 from cell.views.report.data import ReportData
-from cell.views.report.figures.canvas import BLACK, GREEN, GREY, legend_below, panels, style
+from cell.views.report.figures.canvas import BLACK, GREEN, GREY, style
 from cell.views.report.geometry import best_poses, distance_m
 from cell.views.report.numbers import solution_name
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Axes, Figure, legend_below, panels
 
 
 def draw(data: ReportData) -> Figure | None:
@@ -51,17 +48,14 @@ def _panel(ax: Axes, data: ReportData, factors: list[Mapping[str, float]], lette
     sigma = _column(factors, f"{letter}_sigma_px")
     greek = {"alpha": "α", "beta": "β"}[letter]
     if factors:
-        ax.errorbar(
-            distance, value, np.nan_to_num(sigma), fmt="x", color=BLACK, ecolor=GREY, capsize=2,
-            label="measured, ± 1σ", zorder=4,
-        )  # fmt: skip
+        ax.errorbar(distance, value, np.nan_to_num(sigma), marker="x", color=BLACK, ecolor=GREY,
+                    label="measured, ± 1σ", zorder=4)  # fmt: skip
         _zones(ax, data, letter, distance)
         _law(ax, data, letter, distance)
     _moving(ax, data, letter)
     _constants(ax, data, letter)
     _truth(ax, data, letter)
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high + 0.09 * (high - low))  # room for the zones' names
+    ax.head_room(0.09)  # for the zones' names
     ax.set(title=f"{greek} against distance", xlabel="distance (m)", ylabel=f"{greek} (px)")
 
 
@@ -74,17 +68,17 @@ def _zones(ax: Axes, data: ReportData, letter: str, distance: FloatArray) -> Non
     margin = 0.03 * (high - low)
     near = low - margin if near is None else near
     far = high + margin if far is None else far
-    ax.axvspan(near, far, color="#eaf3fa", zorder=0)
+    ax.axvspan(near, far, color="#eaf3fa")
     for start, end, number in ((low, near, 1), (near, far, 2), (far, high, 3)):
         if end - start > 0.04 * (high - low):
             _zone_name(ax, (start + end) / 2, f"zone {number}")
     if zones.get(f"{letter}_px") is not None:
-        ax.hlines(zones[f"{letter}_px"], near, far, color=BLACK, label="mean of zone 2")
+        mean = zones[f"{letter}_px"]
+        ax.plot([near, far], [mean, mean], color=BLACK, label="mean of zone 2")
 
 
 def _zone_name(ax: Axes, x: float, words: str) -> None:
-    ax.text(x, 0.985, words, transform=ax.get_xaxis_transform(), ha="center", va="top",
-            color="#5b616b", fontsize=8)  # fmt: skip
+    ax.annotate(words, x, np.inf, up=-10, anchor="middle", color="#5b616b")
 
 
 def _law(ax: Axes, data: ReportData, letter: str, distance: FloatArray) -> None:
@@ -130,7 +124,7 @@ def _truth(ax: Axes, data: ReportData, letter: str) -> None:
         where = poses.board_from_camera
     if where is not None:
         ax.plot(
-            distance_m(where, data.views.board), truth, ".", color=GREY, markersize=3,
+            distance_m(where, data.views.board), truth, marker=".", linestyle="", color=GREY,
             label="simulator's truth", zorder=1,
         )  # fmt: skip
 

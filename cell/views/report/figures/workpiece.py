@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calib.views import FloatArray
 from cell.views.report.data import ReportData
-from cell.views.report.figures.canvas import legend_below, panels, style
+from cell.views.report.figures.canvas import style
 from cell.views.report.geometry import best_poses, distance_m, reference, workpiece_error_m
 from cell.views.report.numbers import solution_name
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cell.views.report.plot import Figure, legend_below, panels
 
 _SHOWN = ("joint_ml", "fixed_alpha_mle", "zhang_mle")
 
@@ -101,8 +98,6 @@ def draw(data: ReportData) -> Figure | None:
     drawn = {name: error for name, error in found.items() if error is not None}
     if not drawn:
         return None
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     figure, (ax,) = panels(5.3, 3.4)
     for name, error in drawn.items():
         look = style(name)
@@ -111,10 +106,7 @@ def draw(data: ReportData) -> Figure | None:
         steps = by_distance(error)
         middle = [(low + high) / 2 for low, high, _, _ in steps]
         ax.plot(middle, [rms * 1e3 for *_, rms in steps], label=solution_name(name), **look)
-    ax.set_yscale("log")
-    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.yaxis.set_major_formatter("{x:g}")
-    ax.yaxis.set_minor_formatter(NullFormatter())
+    ax.log_y = True
     ax.set(xlabel="distance (m)", ylabel="error at the work piece (mm)")
     legend_below(figure, [ax], columns=2)
     return figure

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
-import matplotlib
 import numpy as np
 
 from cell.views.report import html
@@ -43,6 +42,5 @@ def _flat(content: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]
 def _versions() -> list[tuple[str, str]]:
     return [
         ("calibration-cell", version("calibration-cell")),
-        ("Python, NumPy, Matplotlib", f"{platform.python_version()}, {np.__version__}, "
-                                      f"{matplotlib.__version__}"),
-    ]  # fmt: skip
+        ("Python, NumPy", f"{platform.python_version()}, {np.__version__}"),
+    ]
