@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -83,6 +84,10 @@ class Views:
         Mass at the flange, where known.
     moving:
         True when the frames were captured in motion.
+    extra:
+        Key to (N,) further numbers of the log, whatever they are called.
+    labels:
+        Key to (N,) words of the log (the name of a station); empty where there is none.
     """
 
     board: Board
@@ -105,6 +110,8 @@ class Views:
     robot_model: str | None = None
     payload_kg: float | None = None
     moving: bool = False
+    extra: Mapping[str, FloatArray] = field(default_factory=dict)
+    labels: Mapping[str, NDArray[np.str_]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -121,14 +128,24 @@ class Views:
 
     def take(self, index: NDArray[np.int64] | BoolArray) -> Views:
         """The views at `index` (integers or a mask), in that order."""
-        return replace(self, **{name: getattr(self, name)[index] for name in _PER_FRAME})
+        return replace(
+            self,
+            extra={key: column[index] for key, column in self.extra.items()},
+            labels={key: column[index] for key, column in self.labels.items()},
+            **{name: getattr(self, name)[index] for name in _PER_FRAME},
+        )
 
     def joined(self, other: Views) -> Views:
         """These views and those of `other` (of the same cell), in the order of their frames."""
         columns: dict[str, Any] = {
             name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _PER_FRAME
         }
-        both = replace(self, **columns)
+        both = replace(
+            self,
+            extra=_end_to_end(self, other, "extra", np.nan),
+            labels=_end_to_end(self, other, "labels", ""),
+            **columns,
+        )
         return both.take(np.argsort(both.frame, kind="stable"))
 
     @classmethod
@@ -221,6 +238,16 @@ class Views:
             corner_sigma_px=missing(board.corner_count),
             blur_px=missing(),
         )
+
+
+def _end_to_end(first: Views, second: Views, name: str, missing: float | str) -> dict[str, Any]:
+    """Further columns of both, with `missing` where one of them does not have a key."""
+    columns = [(getattr(views, name), len(views)) for views in (first, second)]
+    keys = list(dict.fromkeys(key for column, _ in columns for key in column))
+    return {
+        key: np.concatenate([c[key] if key in c else np.full(n, missing) for c, n in columns])
+        for key in keys
+    }
 
 
 def _checked_corners(corners_px: FloatArray, board: Board) -> FloatArray:

@@ -13,9 +13,13 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from calib.chain import rigid
+from calib.chain.covariates import CONSTANT, Covariate, covariate_named
 from calib.chain.effect import Effect, Link, Parameter, Present
 from calib.chain.walk import Walk
 from calib.views import FloatArray, Views
+
+UNNAMED = "empirical"
+"""What every effect without a name is called."""
 
 LEGENDRE_TERMS = 4
 HARMONICS = 3
@@ -100,84 +104,6 @@ def site_named(name: str) -> Site:
     return {site.name: site for site in SITES}[name]
 
 
-@dataclass(frozen=True)
-class Covariate:
-    """Something a frame is known by.
-
-    Attributes
-    ----------
-    name, unit:
-        As told to the reader.
-    of:
-        (N,) or (N, D) values from the walk; NaN where not known.
-    cyclic:
-        An angle whose full turn comes back to itself.
-    link:
-        The earliest link at whose turn the values exist.
-    """
-
-    name: str
-    unit: str
-    of: Callable[[Walk], FloatArray]
-    cyclic: bool = False
-
-
-def _logged(column: str) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.asarray(getattr(walk.views, column))
-
-
-def _logged_joint(column: str, index: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.asarray(getattr(walk.views, column)[:, index])
-
-
-def _approach(index: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.sign(
-        walk.views.joints_rad[:, index] - walk.views.approach_joints_rad[:, index]
-    )
-
-
-def _nominal_distance(walk: Walk) -> FloatArray:
-    if walk.camera_from_board.size:
-        return walk.distance_m
-    pose = rigid.inverse(walk.base_from_camera) @ walk.base_from_board
-    return np.asarray(pose[:, 2, :3] @ walk.points_m.mean(axis=0) + pose[:, 2, 3])
-
-
-def _tilt(walk: Walk) -> FloatArray:
-    pose = rigid.inverse(walk.base_from_camera) @ walk.base_from_board
-    return np.asarray(np.arccos(np.clip(np.abs(pose[:, 2, 2]), 0.0, 1.0)))
-
-
-def _gravity(walk: Walk) -> FloatArray:
-    return walk.gravity_in_camera()
-
-
-COVARIATES: tuple[Covariate, ...] = (
-    Covariate("distance", "m", _nominal_distance),
-    Covariate("tilt", "rad", _tilt),
-    Covariate("time", "s", _logged("t_s")),
-    Covariate("order", "frame", lambda walk: walk.views.frame.astype(np.float64)),
-    Covariate("gravity", "g", _gravity),
-    Covariate("temperature", "degC", _logged("temperature_c")),
-    Covariate("focus_position", "steps", _logged("focus_position")),
-    *(Covariate(f"joint_{k + 1}", "rad", _logged_joint("joints_rad", k), True) for k in range(6)),
-    *(
-        Covariate(f"velocity_{k + 1}", "rad/s", _logged_joint("joint_velocity_rad_s", k))
-        for k in range(6)
-    ),
-    *(Covariate(f"approach_{k + 1}", "sign", _approach(k)) for k in range(6)),
-)
-
-
-CONSTANT = Covariate("constant", "1", lambda walk: np.ones((len(walk.views), 1)))
-"""The same in every frame: one column for each number of a site."""
-
-
-def covariate_named(name: str) -> Covariate:
-    """Return the covariate of that name; raises KeyError."""
-    return {covariate.name: covariate for covariate in COVARIATES}[name]
-
-
 def _goes_round(covariate: Covariate, low: float, high: float) -> bool:
     return covariate.cyclic and high - low > np.pi
 
@@ -193,7 +119,7 @@ def basis(
     safe = np.where(np.isfinite(value), value, 0.0)
     if value.ndim == 2:
         return np.asarray(safe * known[:, None])
-    if covariate.name.startswith("approach"):
+    if covariate.two_sided:
         return np.asarray(safe * known)[:, None]
     if _goes_round(covariate, low, high):
         waves = [f(k * safe) for k in range(1, times * HARMONICS + 1) for f in (np.sin, np.cos)]
@@ -227,7 +153,7 @@ class Curve:
     @property
     def can_be_finer(self) -> bool:
         """Whether there is a finer curve of the same site and covariate."""
-        stiff = self.covariate.name.startswith("approach") or self.covariate.name == "gravity"
+        stiff = self.covariate.two_sided or self.covariate.name == "gravity"
         return not (self.fine or stiff or self.period is not None)
 
     def functions(self, walk: Walk) -> FloatArray:
@@ -251,7 +177,7 @@ class Curve:
     @property
     def has_own_constant(self) -> bool:
         """Whether the last of the functions that carry it is a constant."""
-        return self.site.name in _OWN_CONSTANT and self.covariate is not CONSTANT
+        return self.site.name in INNER_JOINTS and self.covariate is not CONSTANT
 
     def usual(self, function: int, functions: int) -> float:
         """How large an amount of one of the functions usually is, as a share of the first one's.
@@ -266,7 +192,7 @@ class Curve:
         return 1.0 if not self.fine or order < smooth else (1.0 + order) ** -2.0
 
 
-_OWN_CONSTANT = ("joint_2", "joint_3", "joint_4", "joint_5")
+INNER_JOINTS = ("joint_2", "joint_3", "joint_4", "joint_5")
 
 
 def empirical(curve: Curve, functions: int) -> Effect:
@@ -282,7 +208,7 @@ def empirical(curve: Curve, functions: int) -> Effect:
         site.shift(amounts, walk)
 
     return Effect(
-        name="empirical",
+        name=UNNAMED,
         law=f"{site.name}/{curve.covariate.name}",
         link=site.acts_in,
         looks_ahead=site.acts_in == "arm",

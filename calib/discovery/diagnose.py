@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.chain.effect import Present
+from calib.chain.empirical import UNNAMED
 from calib.chain.model import kinematics_of, walk
 from calib.discovery.ambiguity import ambiguities
 from calib.discovery.candidates import unseen
@@ -19,6 +20,7 @@ from calib.discovery.diagnosis import (
     Value,
     Verdict,
 )
+from calib.discovery.laws.telling import told_law
 from calib.discovery.locate import Cell, locate
 from calib.discovery.log_consistency.branches import choose_branches, with_branches
 from calib.discovery.log_consistency.mixup import Mixup
@@ -132,7 +134,7 @@ def _diagnosis(
         verdict=_verdict(named, structure),
         effects=named,
         ambiguous_with=ambiguities(search),
-        unexplained=_unexplained(structure),
+        unexplained_all=_unexplained(structure, fits, held_views, search.fitter),
         mismatch=_mismatches(fits, everything),
         split=(split_misfit(plain, judge), split_misfit(twin, judge)),
         proof=proof,
@@ -176,17 +178,11 @@ def _named(fits: _Fits, held: Views, fitter: Fitter) -> tuple[NamedEffect, ...]:
     named = []
     effects = fits.after.model.effects
     for index, present in enumerate(effects):
-        if present.effect.name == "empirical":
+        if present.effect.name == UNNAMED:
             continue
-        rest = effects[:index] + effects[index + 1 :]
-        without = fitter.with_effects(fits.after, rest)
+        without, lost = _missed(fits, index, held, fitter)
         gain = without.minus_two_log - fits.after.minus_two_log
         columns = fits.after.parameters - without.parameters
-        lost = float("nan")
-        if len(held):
-            lost = prediction_rms_px(without.model, held) - prediction_rms_px(
-                fits.after.model, held
-            )
         effect = present.effect
         named.append(
             NamedEffect(
@@ -217,11 +213,32 @@ def _values(twin: JointFit, index: int) -> dict[str, Value]:
     }
 
 
-def _unexplained(structure: ResidualStructure) -> Unexplained | None:
-    if not structure.cells:
-        return None
-    cell = structure.cells[0]
-    return Unexplained(cell.link, cell.site, cell.covariate, cell.where, cell.p_value)
+def _unexplained(
+    structure: ResidualStructure, fits: _Fits, held: Views, fitter: Fitter
+) -> tuple[Unexplained, ...]:
+    """Every term without a name, with its law where there is one."""
+    labels = [present.effect.label for present in fits.after.model.effects]
+    told = []
+    for cell in structure.cells:
+        law = None
+        if cell.law is not None:
+            index = labels.index(cell.law.effect.label)
+            lost = _missed(fits, index, held, fitter)[1]
+            law = told_law(fits.twin, index, lost, cell.rivals)
+        told.append(
+            Unexplained(cell.link, cell.site, cell.covariate, cell.where, cell.p_value, law)
+        )
+    return tuple(told)
+
+
+def _missed(fits: _Fits, index: int, held: Views, fitter: Fitter) -> tuple[JointFit, float]:
+    """The final cell refitted without one effect, and how much worse it predicts (px)."""
+    effects = fits.after.model.effects
+    without = fitter.with_effects(fits.after, effects[:index] + effects[index + 1 :])
+    if not len(held):
+        return without, float("nan")
+    worse = prediction_rms_px(without.model, held) - prediction_rms_px(fits.after.model, held)
+    return without, worse
 
 
 def _mismatches(fits: _Fits, fitter: Fitter) -> tuple[Mismatch, ...]:

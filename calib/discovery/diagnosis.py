@@ -59,14 +59,39 @@ class Ambiguity:
 
 
 @dataclass(frozen=True)
+class FoundLaw:
+    """What is known of physics without a name.
+
+    Attributes
+    ----------
+    form, equation, covariates:
+        How the site follows what, in symbols and units.
+    parameters:
+        Its numbers.
+    holdout_gain_px:
+        How much worse the held-out frames are predicted without it; NaN where none were held out.
+    rivals:
+        Other laws that these data do not rule out, in words.
+    """
+
+    form: str
+    equation: str
+    covariates: tuple[str, ...]
+    parameters: dict[str, Value]
+    holdout_gain_px: float
+    rivals: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Unexplained:
-    """Something real that no known effect accounts for: where it lives."""
+    """Something real that no known effect accounts for: where it lives, and by which law."""
 
     link: str
     site: str
     covariate: str
     where: str
     p_value: float
+    law: FoundLaw | None
 
 
 @dataclass(frozen=True)
@@ -75,7 +100,7 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict, effects, ambiguous_with, unexplained, mismatch, proof:
+    verdict, effects, ambiguous_with, unexplained_all, mismatch, proof:
         As in the contract's diagnosis.json.
     split:
         The misfit of the plain cell and of the twin, judged by the twin's noise.
@@ -90,7 +115,7 @@ class Diagnosis:
     verdict: Verdict
     effects: tuple[NamedEffect, ...]
     ambiguous_with: tuple[Ambiguity, ...]
-    unexplained: Unexplained | None
+    unexplained_all: tuple[Unexplained, ...]
     mismatch: tuple[Mismatch, ...]
     split: tuple[Split, Split]
     proof: Proof | None
@@ -100,3 +125,8 @@ class Diagnosis:
     log: Views
     rejected: tuple[Rejection, ...]
     said: tuple[str, ...]
+
+    @property
+    def unexplained(self) -> Unexplained | None:
+        """The first of the terms without a name: what was missed most."""
+        return self.unexplained_all[0] if self.unexplained_all else None

@@ -11,11 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.chain.effect import Link
+from calib.chain.effect import Link, Present
+from calib.chain.covariates import CONSTANT, COVARIATES, Covariate
 from calib.chain.empirical import (
-    CONSTANT,
-    COVARIATES,
-    Covariate,
     Curve,
     Site,
     present_curve,
@@ -47,9 +45,13 @@ class Cell:
     tried:
         Among how many of its kind the best was picked (periods).
     curve:
-        What to fit to carry it, or None for a field over image or board.
+        What to fit to carry it, or None for a field over image or board, or for a law.
     where:
         Range of the covariate in which the misfit is largest, in words.
+    law:
+        The law by which the site follows the covariate, where one was found.
+    rivals:
+        Other laws that the data do not rule out, in words.
     """
 
     site: str
@@ -59,6 +61,13 @@ class Cell:
     tried: int
     curve: Curve | None
     where: str
+    law: Present | None = None
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def is_field(self) -> bool:
+        """Whether it is a field of shifts over the image or the board."""
+        return self.curve is None and self.law is None
 
     @property
     def p_value(self) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from calib.chain.empirical import present_curve
 from calib.chain.model import walk
+from calib.discovery.laws.contest import as_cell, demanded
 from calib.discovery.locate import Cell, locate
 from calib.discovery.search import Search
 from calib.views import Views
@@ -54,12 +55,16 @@ def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> Res
     found: list[Cell] = []
     views = search.views
     for _ in range(_MOST_CURVES):
+        law = _law(search)
+        if law is not None:
+            found.append(law)
+            continue
         told = alarms(locate(search.best.fit, views))
         cell = next((c for c in told if not is_shape_of_law(c, search)), None)
         if cell is None:
             break
         found.append(cell)
-        if cell.curve is None:
+        if cell.is_field:
             search.drop_beside_field(cell.site, cell.score.gain)
             break
         if not (_carried_finer(search, found, views) or _carry(search, cell, views)):
@@ -67,6 +72,20 @@ def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> Res
     search.drop_on_joints({cell.site for cell in found})
     search.drop_beside_curves()
     return ResidualStructure(search, known + tuple(found))
+
+
+def _law(search: Search) -> Cell | None:
+    """Take in the law that is demanded, and see which names are still needed beside it."""
+    before = search.best
+    tried = demanded(search)
+    if tried is None:
+        return None
+    cell = as_cell(tried, before)
+    if is_shape_of_law(cell, search):
+        return None
+    search.take_in(tried.candidate, tried.trial.fit)
+    search.run()
+    return cell
 
 
 def _carried_finer(search: Search, found: list[Cell], views: Views) -> bool:

@@ -41,7 +41,7 @@ def scattered(leftover: ResidualStructure) -> Scatter | None:
     nothing can be said.
     """
     search = leftover.search
-    in_pictures = any(cell.curve is None for cell in leftover.cells)
+    in_pictures = any(cell.is_field for cell in leftover.cells)
     if in_pictures or not search.fitter.has_robot:
         return None
     fit = search.best.fit

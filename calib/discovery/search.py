@@ -266,6 +266,11 @@ class Search:
         self._settle(fit)
         return self.best.fit
 
+    def take_in(self, candidate: Candidate, fit: JointFit) -> None:
+        """Go on from a fit with one more effect, which is no name."""
+        self.choices[candidate.effect.label] = candidate.choices
+        self._settle(fit)
+
     def put_in(self, present: Present, choices: int = 1, instead_of: Present | None = None) -> bool:
         """Put an effect in without a contest; False where it does not lower the criterion."""
         fit = self.best.fit

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from calib.chain.effects import make_effect
-from calib.chain.empirical import Curve, covariate_named, present_curve, site_named
+from calib.chain.covariates import covariate_named
+from calib.chain.empirical import Curve, present_curve, site_named
 from calib.chain.model import walk
 from calib.discovery.residual_structure import find_residual_structure
 from calib.discovery.search import Search, criterion

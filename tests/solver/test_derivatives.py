@@ -13,7 +13,8 @@ import pytest
 
 from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue
-from calib.chain.empirical import COVARIATES, SITES, Curve, covariate_named, present_curve, span
+from calib.chain.covariates import COVARIATES, covariate_named
+from calib.chain.empirical import SITES, Curve, present_curve, span
 from calib.chain.model import CellModel, predict, walk
 from calib.chain.optics import COLUMN, OPTICS
 from calib.chain.projection import project_with_jacobians

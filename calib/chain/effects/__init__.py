@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 
 from calib.chain.effect import Effect, Present
-from calib.chain.empirical import empirical_from
+from calib.chain.empirical import UNNAMED, empirical_from
+from calib.chain.laws.law import law_from
 
 
 @cache
@@ -54,8 +55,8 @@ def make_effect(name: str, given: Mapping[str, float | str | Sequence[float]]) -
     """
     law = given.get("law")
     numbers = _flat(name, {key: value for key, value in given.items() if key != "law"})
-    if name == "empirical":
-        return empirical_from(str(law), numbers)
+    if name == UNNAMED:
+        return law_from(str(law), numbers) if ":" in str(law) else empirical_from(str(law), numbers)
     effect = find_effect(name, None if law is None else str(law))
     return Present(effect, effect.values(numbers))
 

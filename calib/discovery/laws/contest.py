@@ -1,0 +1,81 @@
+"""Laws fitted in earnest: the shortest that the data support, and whether a name beats it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from calib.chain.laws.law import present_law
+from calib.discovery.candidates import Candidate
+from calib.discovery.laws.frames import frame_blocks
+from calib.discovery.laws.scan import Found, Scan
+from calib.discovery.locate import Cell
+from calib.discovery.score import Score
+from calib.discovery.search import DEMAND, Search, Trial
+from calib.solver.joint import JointFit
+
+_IN_EARNEST = 3
+_PROMISES = -12.0
+"""A scatter that a law explains looks like noise to the score test, which then falls short."""
+
+_LEAST_GAIN = 18.0
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A law fitted next to what the model has."""
+
+    candidate: Candidate
+    trial: Trial
+    found: Found
+
+
+def promising(fit: JointFit, search: Search, at_most: int = _IN_EARNEST) -> list[Found]:
+    """The laws worth a fit, the most promising first."""
+    best = Scan(frame_blocks(fit, search.views), search.views).best(at_most)
+    return [f for f in best if f.worth > _PROMISES and f.gain > _LEAST_GAIN]
+
+
+def fitted(fit: JointFit, search: Search, laws: Sequence[Found]) -> list[Tried]:
+    """Fit each law next to what a cell has; the best by the criterion first."""
+    tried = []
+    for found in laws:
+        candidate = Candidate(present_law(found.law), float(np.exp(found.choices)))
+        ((_, trial),) = search.earnest(fit, [candidate])
+        tried.append(Tried(candidate, trial, found))
+    return sorted(tried, key=lambda one: one.trial.criterion)
+
+
+def demanded(search: Search) -> Tried | None:
+    """The law that the best cell so far demands most; None where it demands none."""
+    fit = search.best.fit
+    tried = fitted(fit, search, promising(fit, search))
+    if not tried or search.best.criterion - tried[0].trial.criterion < DEMAND:
+        return None
+    return tried[0]
+
+
+def as_cell(tried: Tried, before: Trial) -> Cell:
+    """The law as what was found to be left: where it lives, and how sure that is."""
+    law = tried.found.law
+    gain = before.fit.minus_two_log - tried.trial.fit.minus_two_log
+    p_value = float(chi2.sf(max(gain, 0.0), tried.found.columns))
+    covariate = "*".join(c.name for c in law.covariates)
+    score = Score(gain, tried.found.columns, p_value, np.zeros(0))
+    numbers = dict(law.numbers)
+    where = f"from {numbers['at']:.4g} on" if "at" in numbers else "all of it"
+    if law.form.key == "periodic":
+        where = f"{numbers['cycles']:.4g} radians per {law.covariates[0].unit}"
+    return Cell(
+        site=law.site.name,
+        link=law.site.link,
+        covariate=covariate,
+        score=score,
+        tried=max(int(min(np.exp(tried.found.choices), 1e9)), 1),
+        curve=None,
+        where=where,
+        law=tried.trial.fit.model.effects[-1],
+    )

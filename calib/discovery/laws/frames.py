@@ -1,0 +1,157 @@
+"""What each frame says of every site of the chain, so that any law costs a few products only.
+
+Once each frame's own errors have been integrated out, a frame's log likelihood is a quadratic form
+in the shared numbers of the fit and in what every site of the chain does in that frame. A law
+makes the latter a function of covariates times an amount: information and score of any law, and
+of any set of frames, are sums of products of these blocks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.chain.covariates import CONSTANT
+from calib.chain.empirical import Curve, Site, present_curve, site_columns
+from calib.chain.model import walk
+from calib.chain.walk import Walk
+from calib.discovery.score import extended
+from calib.solver.accumulate import local_equations
+from calib.solver.joint import JointFit, walked
+from calib.solver.unknowns import Dependence, amounts, prior_information
+from calib.views import BoolArray, FloatArray, Views
+
+_RELATIVE = 1e-12
+
+
+@dataclass(frozen=True)
+class Component:
+    """One number of one site."""
+
+    site: Site
+    index: int
+
+    @property
+    def typical(self) -> float:
+        """Its usual size."""
+        return self.site.components[self.index][2]
+
+
+@dataclass(frozen=True)
+class FrameBlocks:
+    """Quadratic forms of N frames in T shared numbers of the fit and S components of sites.
+
+    Attributes
+    ----------
+    components:
+        The S components, in units of their usual size.
+    state:
+        The walk of the fit.
+    information, gradient:
+        (N, T + S, T + S) and (N, T + S), corner noise and the frames' own errors accounted for.
+    prior, pull:
+        (T,) inverse variances of the shared numbers' priors, and their gradient.
+    """
+
+    components: tuple[Component, ...]
+    state: Walk
+    information: FloatArray
+    gradient: FloatArray
+    prior: FloatArray
+    pull: FloatArray
+
+    @property
+    def shared(self) -> int:
+        """T, how many numbers of the fit are shared."""
+        return len(self.prior)
+
+    def base(self, frames: BoolArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """(T, T) information and (T,) gradient of the shared numbers from some frames."""
+        t = self.shared
+        information, gradient = self.information[:, :t, :t], self.gradient[:, :t]
+        if frames is not None:
+            information, gradient = information[frames], gradient[frames]
+        return information.sum(axis=0) + np.diag(self.prior), gradient.sum(axis=0) + self.pull
+
+
+def frame_blocks(fit: JointFit, views: Views) -> FrameBlocks:
+    """Linearise every site of the chain around a fit, frame by frame."""
+    state = walk(fit.model, views, **walked(fit.own_error))
+    sites = site_columns(views)
+    presents = [present_curve(Curve(site, CONSTANT, 0.0, 1.0), state) for site in sites]
+    _, found, _, base = extended(fit, views, presents)
+    components = tuple(Component(s, k) for s in sites for k in range(len(s.components)))
+    columns = found.local[:, :, base:] * np.array([c.typical for c in components])
+    mapping = np.concatenate([found.local[:, :, :base], columns], axis=2)
+    information, gradient = _marginal(fit, views, found, mapping)
+    corners = fit.equations.corner_numbers
+    order = _corners_first(base, len(components), corners)
+    information = information[:, order][:, :, order]
+    print_information = fit.noise.print_m**-2.0 if corners else 0.0
+    prior = np.concatenate([prior_information(fit.unknowns), np.full(corners, print_information)])
+    at = np.concatenate([amounts(fit.model, fit.unknowns), fit.equations.corner_shift])
+    return FrameBlocks(components, state, information, gradient[:, order], prior, -prior * at)
+
+
+def _corners_first(base: int, sites: int, corners: int) -> list[int]:
+    """Order in which the printed corners' shifts stand behind the fit's other numbers."""
+    after = base + sites
+    return [*range(base), *range(after, after + corners), *range(base, after)]
+
+
+def _marginal(
+    fit: JointFit, views: Views, found: Dependence, mapping: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(N, P, P) information and (N, P) gradient with each frame's own errors integrated out."""
+    state, with_corners = found.state, bool(fit.equations.corner_numbers)
+    local = local_equations(
+        state.optics,
+        state.camera_from_board,
+        state.points_m,
+        views.corners_px,
+        fit.weight,
+        found.active,
+        found.modes,
+        corners=with_corners,
+    )
+    gram, followed = local.gram, found.own.shape[1]
+    mapped = gram[:, :-1, :-1] @ mapping
+    own_t = np.swapaxes(found.own, 1, 2)
+    own = own_t @ gram[:, :followed, :followed] @ found.own
+    cross = own_t @ mapped[:, :followed]
+    cross_residual = (own_t @ gram[:, :followed, -1:])[:, :, 0]
+    shared = np.swapaxes(mapping, 1, 2) @ mapped
+    gradient = np.einsum("nqp,nq->np", mapping, gram[:, :-1, -1])
+    if with_corners:
+        shared, gradient, cross = _corner_rows(local, found, mapping, shared, gradient, cross)
+    scale = fit.noise.corner_px**-2.0
+    prior = fit.noise.own_information
+    inverse = np.linalg.inv(own * scale + prior)
+    pulled = cross_residual * scale - fit.own_error @ prior
+    back = inverse @ (cross * scale)
+    information = shared * scale - np.swapaxes(cross, 1, 2) @ back * scale
+    gradient = gradient * scale - np.einsum("nfp,nf->np", back, pulled)
+    return 0.5 * (information + np.swapaxes(information, 1, 2)), gradient
+
+
+def _corner_rows(local, found, mapping, shared, gradient, cross):  # type: ignore[no-untyped-def]
+    """The same with each printed corner's own shift behind the other numbers."""
+    n, m = local.own.shape[:2]
+    p, followed = mapping.shape[2], found.own.shape[1]
+    rows = local.cross.reshape(n, 2 * m, -1)
+    by_corner = np.einsum("ncq,nqp->npc", rows[:, :, :-1], mapping, optimize=True)
+    whole = np.zeros((n, p + 2 * m, p + 2 * m))
+    whole[:, :p, :p] = shared
+    whole[:, :p, p:] = by_corner
+    whole[:, p:, :p] = np.swapaxes(by_corner, 1, 2)
+    at = p + 2 * np.arange(m)
+    for i in range(2):
+        for j in range(2):
+            whole[:, at + i, at + j] = local.own[:, :, i, j]
+    own_corner = np.einsum("nqk,ncq->nkc", found.own, rows[:, :, :followed])
+    return (
+        whole,
+        np.concatenate([gradient, rows[:, :, -1]], axis=1),
+        np.concatenate([cross, own_corner], axis=2),
+    )
