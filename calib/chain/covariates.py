@@ -66,25 +66,37 @@ def _gravity(walk: Walk) -> FloatArray:
 
 
 def _gravity_along(axis: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.asarray((walk.base_from_camera[:, :3, axis] @ DOWN_IN_BASE))
+    return lambda walk: np.asarray(walk.base_from_camera[:, :3, axis] @ DOWN_IN_BASE)
 
 
-def _torques_Nm(walk: Walk) -> FloatArray:
+def _torques_nm(walk: Walk) -> FloatArray:
     arm, views = walk.arm, walk.views
     if arm is None:
         return np.full((len(views), 6), np.nan)
     return walk.once(
-        "gravity_torques_Nm",
+        "gravity_torques_nm",
         lambda: arm.gravity_torques(views.joints_rad, views.payload_kg or 0.0),
     )
 
 
+def _moment(axis: int) -> Callable[[Walk], FloatArray]:
+    def of(walk: Walk) -> FloatArray:
+        arm, views = walk.arm, walk.views
+        if arm is None:
+            return np.full(len(views), np.nan)
+        load_kg = views.payload_kg or 0.0
+        moment = walk.once("base_moment_Nm", lambda: arm.base_moment(views.joints_rad, load_kg))
+        return np.asarray(moment[:, axis])
+
+    return of
+
+
 def _load(index: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.asarray(_torques_Nm(walk)[:, index])
+    return lambda walk: np.asarray(_torques_nm(walk)[:, index])
 
 
 def _load_side(index: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.sign(_torques_Nm(walk)[:, index])
+    return lambda walk: np.sign(_torques_nm(walk)[:, index])
 
 
 def _position(axis: int) -> Callable[[Walk], FloatArray]:
@@ -115,9 +127,11 @@ COVARIATES: tuple[Covariate, ...] = (
 DERIVED: tuple[Covariate, ...] = (
     Covariate("exposure", "s", _logged("exposure_s")),
     Covariate("focus_distance", "m", _logged("focus_distance_m")),
+    Covariate("inverse_distance", "1/m", lambda walk: 1.0 / _nominal_distance(walk)),
     Covariate("blur", "px", _logged("blur_px")),
     *(Covariate(f"gravity_{axis}", "g", _gravity_along(k)) for k, axis in enumerate("xyz")),
     *(Covariate(f"load_{k + 1}", "Nm", _load(k)) for k in range(1, 5)),
+    *(Covariate(f"base_moment_{axis}", "Nm", _moment(k)) for k, axis in enumerate("xy")),
     *(Covariate(f"load_side_{k + 1}", "sign", _load_side(k), two_sided=True) for k in range(1, 5)),
     *(Covariate(f"position_{axis}", "m", _position(k)) for k, axis in enumerate("xyz")),
     Covariate("reach", "m", _reach),

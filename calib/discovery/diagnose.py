@@ -20,6 +20,7 @@ from calib.discovery.diagnosis import (
     Value,
     Verdict,
 )
+from calib.discovery.history import with_history
 from calib.discovery.laws.telling import told_law
 from calib.discovery.locate import Cell, locate
 from calib.discovery.log_consistency.branches import choose_branches, with_branches
@@ -61,7 +62,8 @@ def diagnose(
     CalibrationError
         When the recording cannot even be calibrated.
     """
-    repaired = repair_log(views, views if log is None else log)
+    views, log = with_history(views, views if log is None else log)
+    repaired = repair_log(views, log)
     repaired, branch_price = _with_branches(repaired)
     held = held_out(len(repaired.views))
     fitter = Fitter(repaired.views.take(~held), repaired.has_robot)

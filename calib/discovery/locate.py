@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.chain.effect import Link, Present
 from calib.chain.covariates import CONSTANT, COVARIATES, Covariate
+from calib.chain.effect import Link, Present
 from calib.chain.empirical import (
     Curve,
     Site,

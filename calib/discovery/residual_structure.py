@@ -71,19 +71,21 @@ def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> Res
             break
     search.drop_on_joints({cell.site for cell in found})
     search.drop_beside_curves()
-    return ResidualStructure(search, known + tuple(found))
+    present = {p.effect.label for p in search.best.fit.model.effects}
+    kept = [cell for cell in found if cell.law is None or cell.law.effect.label in present]
+    return ResidualStructure(search, known + tuple(kept))
 
 
 def _law(search: Search) -> Cell | None:
     """Take in the law that is demanded, and see which names are still needed beside it."""
     before = search.best
-    tried = demanded(search)
-    if tried is None:
+    told = demanded(search)
+    if not told:
         return None
-    cell = as_cell(tried, before)
+    cell = as_cell(told, before)
     if is_shape_of_law(cell, search):
         return None
-    search.take_in(tried.candidate, tried.trial.fit)
+    search.take_in(told[0].candidate, told[0].trial.fit)
     search.run()
     return cell
 

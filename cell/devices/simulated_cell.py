@@ -17,6 +17,7 @@ from cell.sequencer.guard import Guard
 from cell.storage.files.camera_file import Lens
 from cell.storage.files.cell_file import CellFile, EffectFile, Simulation
 from cell.storage.files.plan_file import Plan
+from cell.storage.recording.further import further_numbers, further_words
 from sim.arm import Repeatability
 from sim.cell import CameraSpec, SimulatedCell
 from sim.log import tour
@@ -202,4 +203,11 @@ def _with_logged(plan: Plan, log: Views) -> Views:
         if view.frame is not None:
             columns["frame"][index] = view.frame
     moving = bool((np.nan_to_num(columns["joint_velocity_rad_s"]) != 0).any())
-    return replace(log, moving=moving, **columns)
+    further = [view.log or {} for view in plan.file.views]
+    return replace(
+        log,
+        moving=moving,
+        extra=further_numbers(further),
+        labels=further_words(further),
+        **columns,
+    )

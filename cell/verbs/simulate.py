@@ -55,7 +55,8 @@ def simulate_corners(plan: Plan, folder: Path, seed: int | None = None) -> int:
     corners = Corners(dict(zip(views.frame.tolist(), views.corners_px, strict=True)))
     with RecordingWriter.create(folder, header) as writer:
         for index, view in enumerate(plan.file.views):
-            writer.append(_record(views, index, {"view": view.name, "station": view.station}))
+            more = {"view": view.name, "station": view.station, **(view.log or {})}
+            writer.append(_record(views, index, more))
     write_corners(folder / DETECTIONS, corners, views.board)
     return len(views)
 

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from calib.chain import rigid
+from calib.chain.covariates import COVARIATES, covariate_named, covariates_of
 from calib.chain.effect import Present
 from calib.chain.effects import make_effect
 from calib.chain.empirical import (
-    COVARIATES,
     SITES,
     Curve,
-    covariate_named,
     empirical,
     present_curve,
     site_named,
@@ -142,5 +141,17 @@ def test_covariates_are_known_where_they_were_logged() -> None:
         assert len(value) == len(views), covariate.name
         logged = covariate.name != "focus_position"
         assert np.isfinite(value).all() == logged, covariate.name
-    with pytest.raises(KeyError):
-        covariate_named("moon")
+
+
+def test_any_key_of_the_log_is_a_covariate_and_so_is_every_word_of_it() -> None:
+    model, views = cell()
+    half = np.arange(len(views)) % 2 == 0
+    words = np.where(half, "near", "far")
+    logged = replace(views, extra={"gain_db": np.where(half, 6.0, 0.0)}, labels={"lamp": words})
+    names = [covariate.name for covariate in covariates_of(logged)]
+    assert {"gain_db", "lamp=near", "lamp=far"} <= set(names)
+    assert covariate_named("gain_db").unit == "dB"
+    later = walk(model, logged.take(np.array([2, 3])))
+    assert covariate_named("gain_db").of(later).tolist() == [6.0, 0.0]
+    assert covariate_named("lamp=near").of(later).tolist() == [1.0, 0.0]
+    assert np.isnan(covariate_named("moon").of(later)).all()

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib.chain.effects import make_effect
 from calib.chain.covariates import covariate_named
+from calib.chain.effects import make_effect
 from calib.chain.empirical import Curve, present_curve, site_named
 from calib.chain.model import kinematics_of, walk
 from calib.discovery.fields import field_scores

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib.chain.effects import make_effect
 from calib.chain.covariates import covariate_named
+from calib.chain.effects import make_effect
 from calib.chain.empirical import Curve, present_curve, site_named
 from calib.chain.model import walk
 from calib.discovery.residual_structure import find_residual_structure

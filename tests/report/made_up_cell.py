@@ -226,6 +226,7 @@ def diagnosis(**changes: Any) -> dict[str, Any]:
         "frames_rejected": [],
         "notes": ["temperature_c was not logged: thermal_focal_drift is looked for against time"],
         "unexplained": None,
+        "unexplained_all": [],
         **changes,
     }  # fmt: skip
 

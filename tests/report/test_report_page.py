@@ -158,16 +158,28 @@ def test_a_diagnosis_alone_makes_a_report(tmp_path: Path) -> None:
 def test_what_is_unexplained_warns_in_the_first_sentence(tmp_path: Path) -> None:
     left = {
         "link": "mount",
-        "site": "x",
-        "covariate": "gravity",
+        "site": "mounted_pose",
+        "covariate": "gravity_x",
         "p_value": 1e-12,
         "where": "upright",
+        "law": {
+            "form": "linear",
+            "equation": "mounted_pose.x_m = constant +0.0003 (gravity_x - 0) [m]",
+            "covariates": ["gravity_x"],
+            "parameters": {"slope_x_m": {"value": 3e-4, "sigma": 1e-5, "unit": "m/g"}},
+            "holdout_gain_px": 0.31,
+            "rivals": ["step: mounted_pose along order (3.0 behind)"],
+        },
     }
     data = made_up_cell.full(9)
-    data = replace(data, diagnosis=made_up_cell.diagnosis(verdict="unexplained", unexplained=left))
+    told = made_up_cell.diagnosis(verdict="unexplained", unexplained=left, unexplained_all=[left])
+    data = replace(data, diagnosis=told)
     _, text = parsed(data, tmp_path)
     assert "With care" in text
-    assert "Something real is left in the mount, along gravity, upright" in text
+    assert "The mounted pose follows gravity x, upright" in text
+    assert "Look at what holds the camera" in text
+    assert "0.31 px worse without it" in text
+    assert "step: mounted_pose along order (3.0 behind)" in text
 
 
 def test_text_from_files_is_escaped(tmp_path: Path) -> None:

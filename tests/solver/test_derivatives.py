@@ -11,9 +11,9 @@ import autograd
 import numpy as np
 import pytest
 
+from calib.chain.covariates import COVARIATES, covariate_named
 from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue
-from calib.chain.covariates import COVARIATES, covariate_named
 from calib.chain.empirical import SITES, Curve, present_curve, span
 from calib.chain.model import CellModel, predict, walk
 from calib.chain.optics import COLUMN, OPTICS

@@ -70,9 +70,7 @@ def functions_of(
 ) -> FloatArray:
     """(N, B) of a form's functions; zero in the rows in which a value is not known."""
     known = np.all([np.isfinite(value) for value in values], axis=0)
-    safe = [
-        np.where(known, value, seen.middle) for value, seen in zip(values, ranges, strict=True)
-    ]
+    safe = [np.where(known, value, seen.middle) for value, seen in zip(values, ranges, strict=True)]
     return np.asarray(form.of(safe, ranges, numbers) * known[:, None])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
@@ -14,7 +14,7 @@ from calib.discovery.laws.frames import frame_blocks
 from calib.discovery.laws.scan import Found, Scan
 from calib.discovery.locate import Cell
 from calib.discovery.score import Score
-from calib.discovery.search import DEMAND, Search, Trial
+from calib.discovery.search import DEMAND, UNDECIDED, Search, Trial
 from calib.solver.joint import JointFit
 
 _IN_EARNEST = 3
@@ -49,17 +49,25 @@ def fitted(fit: JointFit, search: Search, laws: Sequence[Found]) -> list[Tried]:
     return sorted(tried, key=lambda one: one.trial.criterion)
 
 
-def demanded(search: Search) -> Tried | None:
-    """The law that the best cell so far demands most; None where it demands none."""
+def demanded(search: Search) -> list[Tried]:
+    """The law that the best cell so far demands most, and its rivals; none where none is."""
     fit = search.best.fit
     tried = fitted(fit, search, promising(fit, search))
     if not tried or search.best.criterion - tried[0].trial.criterion < DEMAND:
-        return None
-    return tried[0]
+        return []
+    return [t for t in tried if t.trial.criterion < tried[0].trial.criterion + UNDECIDED]
 
 
-def as_cell(tried: Tried, before: Trial) -> Cell:
+def _rival(rival: Tried, best: Tried) -> str:
+    law = rival.found.law
+    along = " * ".join(covariate.name for covariate in law.covariates)
+    behind = rival.trial.criterion - best.trial.criterion
+    return f"{law.form.name}: {law.site.name} along {along} ({behind:.1f} behind)"
+
+
+def as_cell(told: Sequence[Tried], before: Trial) -> Cell:
     """The law as what was found to be left: where it lives, and how sure that is."""
+    tried, rivals = told[0], told[1:]
     law = tried.found.law
     gain = before.fit.minus_two_log - tried.trial.fit.minus_two_log
     p_value = float(chi2.sf(max(gain, 0.0), tried.found.columns))
@@ -77,5 +85,6 @@ def as_cell(tried: Tried, before: Trial) -> Cell:
         tried=max(int(min(np.exp(tried.found.choices), 1e9)), 1),
         curve=None,
         where=where,
-        law=tried.trial.fit.model.effects[-1],
+        law=tried.candidate.present,
+        rivals=tuple(_rival(rival, tried) for rival in rivals),
     )

@@ -17,12 +17,10 @@ from calib.chain.empirical import Curve, Site, present_curve, site_columns
 from calib.chain.model import walk
 from calib.chain.walk import Walk
 from calib.discovery.score import extended
-from calib.solver.accumulate import local_equations
+from calib.solver.accumulate import LocalEquations, local_equations
 from calib.solver.joint import JointFit, walked
 from calib.solver.unknowns import Dependence, amounts, prior_information
 from calib.views import BoolArray, FloatArray, Views
-
-_RELATIVE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -135,8 +133,17 @@ def _marginal(
     return 0.5 * (information + np.swapaxes(information, 1, 2)), gradient
 
 
-def _corner_rows(local, found, mapping, shared, gradient, cross):  # type: ignore[no-untyped-def]
+def _corner_rows(
+    local: LocalEquations,
+    found: Dependence,
+    mapping: FloatArray,
+    shared: FloatArray,
+    gradient: FloatArray,
+    cross: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The same with each printed corner's own shift behind the other numbers."""
+    assert local.own is not None
+    assert local.cross is not None
     n, m = local.own.shape[:2]
     p, followed = mapping.shape[2], found.own.shape[1]
     rows = local.cross.reshape(n, 2 * m, -1)

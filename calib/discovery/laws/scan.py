@@ -7,8 +7,8 @@ amounts and fitted shapes at the Bayesian price of a number, and every choice am
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,12 +21,6 @@ from calib.discovery.score import pose_numbers
 from calib.views import FloatArray, Views
 
 _LEAST_SPREAD = 1e-9
-_BLOCK = 256
-_FEW_CYCLES = 4
-"""Beyond so many cycles a turn only the joint itself follows its angle."""
-
-_PAIRED = 12
-"""Covariates of which products are looked for: those of the best single laws."""
 
 
 @dataclass(frozen=True)
@@ -105,15 +99,12 @@ class Scan:
 
     def best(self, at_most: int) -> list[Found]:
         """The most promising laws, no two of the same site, covariates and form."""
-        single = [f for form in forms() if form.covariates == 1 for f in self._singly(form)]
-        single.sort(key=lambda f: -f.worth)
-        leading = list(dict.fromkeys(f.law.covariates[0].name for f in single))[:_PAIRED]
-        paired = [f for form in forms() if form.covariates == 2 for f in self._paired(form, leading)]
-        ranked = sorted([*single, *paired], key=lambda f: -f.worth)
+        found = [f for form in forms() if form.covariates == 1 for f in self._singly(form)]
+        found += [f for form in forms() if form.covariates == 2 for f in self._paired(form)]
         told: dict[tuple[str, str, str], Found] = {}
-        for found in ranked:
-            along = "*".join(c.name for c in found.law.covariates)
-            told.setdefault((found.law.site.name, along, found.law.form.key), found)
+        for one in sorted(found, key=lambda f: -f.worth):
+            along = "*".join(c.name for c in one.law.covariates)
+            told.setdefault((one.law.site.name, along, one.law.form.key), one)
             if len(told) == at_most:
                 break
         return list(told.values())
@@ -122,43 +113,53 @@ class Scan:
         for covariate in self.covariates:
             value = self.values[covariate.name]
             if form.fits(covariate.name, value):
-                yield from self._along(form, (covariate,))
+                yield from self._along(form, covariate)
 
-    def _paired(self, form: Form, names: Sequence[str]) -> Iterator[Found]:
-        known = [c for c in self.covariates if c.name in names]
-        extra = float(np.log(max(len(self.covariates), 1)))
-        for a, first in enumerate(known):
-            for second in known[a + 1 :]:
-                yield from self._along(form, (first, second), extra)
+    def _paired(self, form: Form) -> Iterator[Found]:
+        """The best pair of covariates for each group of components."""
+        known = [c for c in self.covariates if form.fits(c.name, self.values[c.name])]
+        pairs = [(a, b) for k, a in enumerate(known) for b in known[k + 1 :]]
+        if not pairs:
+            return
+        functions = np.stack([self._functions(form, pair, {}) for pair in pairs])
+        ways = float(np.log(len(self.groups) * len(pairs))) + self._forms
+        for group, gains in self._gains(functions, ""):
+            best = int(np.argmax(gains))
+            law = self._law(form, pairs[best], {}, group)
+            yield self._found(law, float(gains[best]), ways)
 
-    def _along(
-        self, form: Form, covariates: tuple[Covariate, ...], choices: float = 0.0
-    ) -> Iterator[Found]:
-        """The best numbers for each group of components."""
+    def _functions(
+        self, form: Form, covariates: tuple[Covariate, ...], numbers: Numbers
+    ) -> FloatArray:
         values = [self.values[c.name] for c in covariates]
-        ranges = tuple(Range(float(np.nanmin(v)), float(np.nanmax(v))) for v in values)
-        tried = form.tried(values, ranges)
+        return functions_of(form, values, self._ranges(covariates), numbers)
+
+    def _ranges(self, covariates: tuple[Covariate, ...]) -> tuple[Range, ...]:
+        values = [self.values[c.name] for c in covariates]
+        return tuple(Range(float(np.nanmin(v)), float(np.nanmax(v))) for v in values)
+
+    def _found(self, law: Law, gain: float, ways: float) -> Found:
+        shapes = sum(number.fitted for number in law.form.numbers)
+        columns = len(law.form.functions) * len(law.components) + shapes
+        worth = gain - columns * self.number - 2.0 * ways
+        return Found(law, gain, columns + law.constant, ways, worth)
+
+    def _along(self, form: Form, covariate: Covariate) -> Iterator[Found]:
+        """The best numbers for each group of components."""
+        along = (covariate,)
+        tried = form.tried([self.values[covariate.name]], self._ranges(along))
         if not tried:
             return
-        functions = np.stack([functions_of(form, values, ranges, numbers) for numbers in tried])
-        amounts = len(form.functions)
-        shapes = sum(number.fitted for number in form.numbers)
-        ways = self._pairs + self._forms + choices + float(np.log(len(tried)))
-        for group, gains in self._gains(functions, covariates[0].name):
+        functions = np.stack([self._functions(form, along, numbers) for numbers in tried])
+        ways = self._pairs + self._forms + float(np.log(len(tried)))
+        swings = form.key == "periodic" and covariate.cyclic
+        for group, gains in self._gains(functions, covariate.name if swings else ""):
             best = int(np.argmax(gains))
-            columns = amounts * len(group.members) + shapes
-            gain = float(gains[best])
-            worth = gain - columns * self.number - 2.0 * ways
-            law = self._law(form, covariates, ranges, tried[best], group)
-            yield Found(law, gain, columns + law.constant, ways, worth)
+            law = self._law(form, along, tried[best], group)
+            yield self._found(law, float(gains[best]), ways)
 
     def _law(
-        self,
-        form: Form,
-        covariates: tuple[Covariate, ...],
-        ranges: tuple[Range, ...],
-        numbers: Numbers,
-        group: _Group,
+        self, form: Form, covariates: tuple[Covariate, ...], numbers: Numbers, group: _Group
     ) -> Law:
         members = [self.blocks.components[k] for k in group.members]
         law = Law(
@@ -166,15 +167,14 @@ class Scan:
             components=tuple(m.index for m in members),
             form=form,
             covariates=covariates,
-            ranges=ranges,
+            ranges=self._ranges(covariates),
             numbers=tuple(numbers.items()),
         )
-        return Law(**{**vars(law), "constant": may_need_constant(law)})
+        return replace(law, constant=may_need_constant(law))
 
-    def _gains(self, functions: FloatArray, along: str) -> Iterator[tuple[_Group, FloatArray]]:
-        """(G,) gains of G sets of (G, N, B) functions, for every group of components."""
-        many = len(functions) > _BLOCK
-        groups = [g for g in self.groups if not many or g.site == along]
+    def _gains(self, functions: FloatArray, only: str) -> Iterator[tuple[_Group, FloatArray]]:
+        """(G,) gains of G sets of (G, N, B) functions, for every group, or those of one site."""
+        groups = [g for g in self.groups if only in ("", g.site)]
         if not groups:
             return
         needed = sorted({k for group in groups for k in group.members})
@@ -188,7 +188,7 @@ class Scan:
 
     def _whole(self, functions: FloatArray, needed: list[int]) -> tuple[FloatArray, FloatArray]:
         """(G, S B, S B) information and (G, S B) score of the S components following them."""
-        g, n, b = functions.shape
+        g, _, b = functions.shape
         own = self._own[:, needed][:, :, needed]
         s, t = len(needed), self._cross.shape[2]
         cross = np.einsum("gnb,nst->gsbt", functions, self._cross[:, needed], optimize=True)

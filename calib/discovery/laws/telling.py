@@ -22,7 +22,7 @@ class _Fitted:
     covariance: FloatArray
 
     def value(self, name: str) -> tuple[float, int]:
-        """A number and its place."""
+        """Return a number and its place."""
         at = [p.name for p in self.present.effect.parameters].index(name)
         return float(self.present.values[at]), at
 
@@ -30,13 +30,13 @@ class _Fitted:
         """A number as it is."""
         value, at = self.value(name)
         unit = self.present.effect.parameters[at].unit
-        return Value(value, float(np.sqrt(max(self.covariance[at, at], 0.0))), unit)
+        return Value(value, float(np.sqrt(np.maximum(self.covariance[at, at], 0.0))), unit)
 
-    def of(self, names: tuple[str, ...], slope: FloatArray) -> float:
+    def sigma_along(self, names: tuple[str, ...], slope: FloatArray) -> float:
         """Sigma of something that follows these numbers with that slope."""
         at = [self.value(name)[1] for name in names]
         part = self.covariance[np.ix_(at, at)]
-        return float(np.sqrt(max(slope @ part @ slope, 0.0)))
+        return float(np.sqrt(np.maximum(slope @ part @ slope, 0.0)))
 
 
 def _fitted(twin: JointFit, index: int) -> _Fitted:
@@ -88,9 +88,9 @@ def _swinging(law: Law, fitted: _Fitted) -> dict[str, Value]:
         size = float(np.hypot(sine, cosine))
         along = np.array([sine, cosine]) / max(size, 1e-300)
         across = np.array([-cosine, sine]) / max(size, 1e-300) ** 2
-        told[f"amplitude_{component}"] = Value(size, fitted.of(names, along), unit)
+        told[f"amplitude_{component}"] = Value(size, fitted.sigma_along(names, along), unit)
         phase = float(np.arctan2(cosine, sine))
-        told[f"phase_rad_{component}"] = Value(phase, fitted.of(names, across), "rad")
+        told[f"phase_rad_{component}"] = Value(phase, fitted.sigma_along(names, across), "rad")
     cycles = fitted.plain("cycles")
     if law.covariates[0].cyclic:
         told["cycles_per_turn"] = Value(cycles.value, cycles.sigma, "1")

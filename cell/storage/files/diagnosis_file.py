@@ -97,6 +97,31 @@ class AmbiguityPart(ResultPart):
     """A plan file that would, beside this file; null where no poses can."""
 
 
+class LawPart(ResultPart):
+    """What is known of physics without a name."""
+
+    form: Literal[
+        "linear",
+        "quadratic",
+        "product",
+        "periodic",
+        "saturating",
+        "relaxation",
+        "step",
+        "play",
+        "field",
+        "curve",
+    ]
+    equation: str
+    """In symbols and units."""
+    covariates: list[str]
+    parameters: dict[str, ValuePart]
+    holdout_gain_px: float | None
+    """How much worse the held-out frames are predicted without it; null where none were."""
+    rivals: list[str]
+    """Other laws that these data do not rule out."""
+
+
 class UnexplainedPart(ResultPart):
     """Something real without a name: where it lives."""
 
@@ -105,6 +130,8 @@ class UnexplainedPart(ResultPart):
     covariate: str
     where: str
     p_value: Probability
+    law: LawPart | None = None
+    """By which law the site follows the covariate; null where none was found."""
 
 
 class NoisePart(ResultPart):
@@ -130,6 +157,8 @@ class DiagnosisFile(ResultPart):
     effects: list[EffectPart]
     ambiguous_with: list[AmbiguityPart]
     unexplained: UnexplainedPart | None
+    """The first of `unexplained_all`."""
+    unexplained_all: list[UnexplainedPart]
     noise: NoisePart
     frames_used: list[int]
     frames_rejected: list[RejectedPart]

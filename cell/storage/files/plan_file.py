@@ -53,6 +53,8 @@ class View(Part):
     focus_position: Finite | None = None
     focus_distance_m: Finite | None = None
     exposure_s: Positive | None = None
+    log: dict[str, Finite | str] | None = None
+    """Further keys of the log, as they are to stand there."""
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:

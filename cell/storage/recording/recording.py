@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,6 +19,7 @@ from cell.storage.recording import corners as corner_file
 from cell.storage.recording import frames as frame_file
 from cell.storage.recording.corners import Corners, read_corners
 from cell.storage.recording.frames import FrameRecord, read_frames
+from cell.storage.recording.further import further_numbers, further_words
 from cell.storage.recording.header import Header, read_header
 
 log = logging.getLogger(__name__)
@@ -159,8 +159,8 @@ def frames_as_views(
         robot_model=header.robot.model,
         payload_kg=header.robot.payload_kg,
         moving=header.capture.mode == "moving",
-        extra=_further_numbers(frames),
-        labels=_words(frames),
+        extra=further_numbers(_further(frames)),
+        labels=further_words(_further(frames)),
         **columns,
         **_corner_columns(frames, corners or Corners({}), blank),
     )
@@ -193,34 +193,6 @@ def _further(frames: Sequence[FrameRecord]) -> list[dict[str, Any]]:
     return [
         {k: v for k, v in frame.model_dump().items() if k not in _NO_COVARIATES} for frame in frames
     ]
-
-
-def _further_numbers(frames: Sequence[FrameRecord]) -> dict[str, FloatArray]:
-    """Every other number of the log by its key, NaN where a frame has none.
-
-    The numbers of a list count one by one, from 1: `current_a: [1.0, 2.0]` makes `current_a_1`
-    and `current_a_2`.
-    """
-    columns: dict[str, FloatArray] = {}
-    for index, further in enumerate(_further(frames)):
-        for key, value in further.items():
-            listed = value if isinstance(value, (list, tuple)) else [value]
-            for at, number in enumerate(listed, start=1):
-                if isinstance(number, (int, float)) and math.isfinite(number):
-                    name = key if value is number else f"{key}_{at}"
-                    column = columns.setdefault(name, np.full(len(frames), np.nan))
-                    column[index] = float(number)
-    return columns
-
-
-def _words(frames: Sequence[FrameRecord]) -> dict[str, NDArray[np.str_]]:
-    """Every other word of the log by its key, empty where a frame has none."""
-    further = _further(frames)
-    keys = dict.fromkeys(k for one in further for k, v in one.items() if isinstance(v, str))
-    return {
-        key: np.array([v if isinstance(v := one.get(key), str) else "" for one in further])
-        for key in keys
-    }
 
 
 def _poses(frames: Sequence[FrameRecord]) -> FloatArray:

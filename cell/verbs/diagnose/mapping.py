@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from calib.discovery.diagnosis import Ambiguity, Diagnosis, NamedEffect
+from calib.discovery.diagnosis import Ambiguity, Diagnosis, FoundLaw, NamedEffect, Unexplained
 from calib.discovery.start import UNKNOWN_POSE
 from cell.storage.files.diagnosis_file import SCHEMA, DiagnosisFile
 from cell.verbs.diagnose.separate import Separation
@@ -33,7 +33,8 @@ def as_mapping(
             _ambiguity(pair, separation)
             for pair, separation in zip(found.ambiguous_with, separations, strict=True)
         ],
-        "unexplained": None if found.unexplained is None else vars(found.unexplained),
+        "unexplained": None if found.unexplained is None else _unexplained(found.unexplained),
+        "unexplained_all": [_unexplained(one) for one in found.unexplained_all],
         "noise": {
             "corner_px": noise.corner_px,
             "flange_m": noise.flange_m if heard else None,
@@ -51,6 +52,19 @@ def as_mapping(
 def _ambiguity(pair: Ambiguity, separation: Separation) -> dict[str, Any]:
     why = f"{pair.why}; {separation.why}"
     return {**vars(pair), "why": why, "separate_with": separation.file}
+
+
+def _unexplained(one: Unexplained) -> dict[str, Any]:
+    return {**vars(one), "law": None if one.law is None else _law(one.law)}
+
+
+def _law(law: FoundLaw) -> dict[str, Any]:
+    gain = law.holdout_gain_px
+    return {
+        **vars(law),
+        "parameters": {name: vars(value) for name, value in law.parameters.items()},
+        "holdout_gain_px": gain if math.isfinite(gain) else None,
+    }
 
 
 def _effect(effect: NamedEffect) -> dict[str, Any]:

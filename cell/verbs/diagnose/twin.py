@@ -23,7 +23,7 @@ The simulated twin of a recording: its cell with what the diagnosis found, at th
 `cell simulate` with this file makes a recording like it, effects and noise included."""
 
 _VECTORS = ("joint_velocity_rad_s", "approach_joints_rad")
-_SCALARS = ("t_s", "temperature_c", "focus_position", "focus_distance_m")
+_SCALARS = ("t_s", "temperature_c", "focus_position", "focus_distance_m", "exposure_s")
 
 
 def twin_text(found: Diagnosis, recording: Recording) -> str:
@@ -99,5 +99,9 @@ def _views(views: Views) -> list[dict[str, Any]]:
             value = getattr(views, name)[i]
             if np.isfinite(value):
                 view[name] = float(value)
+        further = {k: float(v[i]) for k, v in views.extra.items() if np.isfinite(v[i])}
+        words = {k: str(v[i]) for k, v in views.labels.items() if v[i]}
+        if further or words:
+            view["log"] = {**further, **words}
         told.append(view)
     return told

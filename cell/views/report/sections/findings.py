@@ -126,16 +126,47 @@ def _cost(data: ReportData, effect: Mapping[str, Any]) -> str:
 
 
 def _unexplained(diagnosis: Mapping[str, Any]) -> str:
-    left = diagnosis.get("unexplained")
-    if not left:
+    every = diagnosis.get("unexplained_all") or []
+    if not every:
         return ""
+    told = "".join(_without_a_name(left) for left in every)
+    return f"<h3>What nobody can name</h3>{told}"
+
+
+_LOOK_AT = {
+    "arm": "the arm: base bolts, joints, gears, cables and hoses that pull",
+    "mount": "what holds the camera (or the board) on the flange",
+    "board": "the board and what it stands on",
+    "lens": "the lens and its focus, and the camera's settings",
+    "sensor": "the camera: its settings, its housing, its sensor",
+}
+
+
+def _without_a_name(left: Mapping[str, Any]) -> str:
+    """A sentence, the law with its numbers, and what to look at on the machine."""
     place = f", {left['where']}" if left.get("where") else ""
+    site, along = (str(left[key]).replace("_", " ") for key in ("site", "covariate"))
     words = (
-        f"Something real is left in the {left['link']}, along {left['covariate']}{place} "
-        f"(p {probability(left.get('p_value'))}). "
-        "No known effect accounts for it; look there."
+        f"The {site} follows {along}{place} "
+        f"(p {probability(left.get('p_value'))}), and no known effect accounts for it. "
+        f"Look at {_LOOK_AT.get(left['link'], left['link'])}, and at what changes with {along}."
     )
-    return f"<h3>What nobody can name</h3>{html.paragraph(words, 'bad-note')}"
+    return html.paragraph(words, "bad-note") + _law(left.get("law"))
+
+
+def _law(law: Mapping[str, Any] | None) -> str:
+    if not law:
+        return ""
+    gain = law.get("holdout_gain_px")
+    worth = "" if gain is None else f" Held-out frames are {gain:.2f} px worse without it."
+    rivals = law.get("rivals") or []
+    others = "" if not rivals else f" Not ruled out: {'; '.join(rivals)}."
+    rows = [
+        (name.replace("_", " "), f"{v['value']:.4g}", f"{v['sigma']:.2g}", v["unit"])
+        for name, v in law["parameters"].items()
+    ]
+    table = html.table(("number", "value", "one sigma", "unit"), rows)
+    return html.paragraph(f"Law ({law['form']}): {law['equation']}.{worth}{others}") + table
 
 
 def _rivals(diagnosis: Mapping[str, Any]) -> str:
