@@ -34,14 +34,14 @@ class Scatter:
     cell: Cell
 
 
-def scattered(leftover: ResidualStructure) -> Scatter | None:
+def scattered(structure: ResidualStructure) -> Scatter | None:
     """How the focal length scatters in the best cell that was found; None where it does not.
 
     A field of shifts that is left in the pictures bends poses along the axis, too: beside one
     nothing can be said.
     """
-    search = leftover.search
-    in_pictures = any(cell.is_field for cell in leftover.cells)
+    search = structure.search
+    in_pictures = any(cell.is_field for cell in structure.cells)
     if in_pictures or not search.fitter.has_robot:
         return None
     fit = search.best.fit
