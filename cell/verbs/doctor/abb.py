@@ -52,11 +52,11 @@ def _state(robot: AbbRobot) -> list[Finding]:
 
 
 def _secured(url: str) -> Finding:
-    found = "HTTPS, of a certificate that the cell file trusts"
+    found = "yes, of a certificate that the cell file trusts"
     if not url.startswith("https"):
-        found = "HTTP: whoever is on this network can read along and order"
+        found = "no, HTTP: whoever is on this network can read along and order"
     mend = "keep the robot on a network of its own; switch HTTPS on where the controller has it"
-    return Finding("ABB link", url.startswith("https"), found, mend, needed=False)
+    return Finding("ABB HTTPS", url.startswith("https"), found, mend, needed=False)
 
 
 def _link_watch(watch: LinkWatch, wanted: bool) -> Finding:
