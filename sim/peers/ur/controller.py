@@ -11,9 +11,8 @@ import threading
 import time
 
 from calib.chain.kinematics import ArmKinematics
-from drivers.arm import Arm, ArmState, Motion, MoveTarget
+from drivers.arm import Arm, Motion, MoveTarget
 from drivers.errors import DeviceError, SafetyError
-from drivers.ur.pose import base_from_tcp, pose_of
 from drivers.ur.wire import RTDE_PORT, Value
 from sim.peers.controller_faults import Reported, StopOrders
 from sim.peers.events import Event
@@ -25,6 +24,7 @@ from sim.peers.ur.primary import PrimaryServer
 from sim.peers.ur.program import ControlProgram
 from sim.peers.ur.rtde import RtdeServer
 from sim.peers.ur.script import ScriptServer
+from sim.peers.ur.variables import motion, status
 
 DASHBOARD_PORT, PRIMARY_PORT, SCRIPT_PORT = 29999, 30001, 30003
 UNLOCK_WAIT_S = 5.0
@@ -69,6 +69,8 @@ class URController:
         self.rate_hz = rate_hz
         self.version = (5, 12, 6, 1102099)
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
+        self.payload_kg = 0.0
+        self.payload_cog_m: tuple[float, ...] = (0.0,) * 3
         self.remote_control = True
         self.faults = URFaults()
         self.stop_orders = StopOrders(lambda: self.faults, self.halt, self.note)
@@ -145,6 +147,16 @@ class URController:
         """The five seconds pass after which a protective stop may be unlocked."""
         self._protective_stop_s -= UNLOCK_WAIT_S
 
+    def power(self, mode: Robot) -> None:
+        """Switch the arm's power and brakes; without power nothing moves."""
+        with self._lock:
+            if self.safety is not Safety.NORMAL:
+                return
+            if mode is not Robot.RUNNING:
+                self._end_program()
+                self.halt("power or brakes off")
+            self.robot_mode = mode
+
     def restore(self) -> None:
         """Cable in, button released, arm powered, in remote control, no program loaded."""
         with self._lock:
@@ -155,6 +167,12 @@ class URController:
             self.safety, self.robot_mode = Safety.NORMAL, Robot.RUNNING
 
     # ---- what its ports order ----------------------------------------------------------------
+
+    @property
+    def model(self) -> str:
+        """The arm's model as the dashboard names it: without the e of e-Series."""
+        name = self.kinematics.name if self.kinematics is not None else "ur5"
+        return name.upper().removesuffix("E")
 
     @staticmethod
     def now() -> float:
@@ -189,6 +207,15 @@ class URController:
                 self.begin_move(self._target)
             return True
 
+    def pause(self) -> bool:
+        """Pause the program that runs, and its motion; return whether there was one."""
+        with self._lock:
+            if self.runtime is not Runtime.PLAYING:
+                return False
+            self.runtime = Runtime.PAUSED
+            self.stop_orders.take("pause")
+            return True
+
     def stop_program(self, why: str) -> None:
         """End the program and its motion, as far as the faults let it."""
         with self._lock:
@@ -215,6 +242,10 @@ class URController:
         except (SafetyError, DeviceError) as error:
             self.note(f"refused by the arm: {error}")
             self._end_program()
+
+    def joints_rad(self) -> tuple[float, ...]:
+        """Present joint angles."""
+        return self.arm.state().joints_rad or (0.0,) * 6
 
     def halt(self, why: str) -> None:
         """Stop the arm, whatever the faults say."""
@@ -248,35 +279,19 @@ class URController:
         """Return every variable of this cycle, all of the same instant."""
         with self._lock:
             state = self._reported()
-            return {**self.registers, **self._status(), **self._kinematics(state)}
+            return {
+                **self.registers,
+                "tcp_offset": self.tcp_offset,
+                "payload": self.payload_kg,
+                "payload_cog": self.payload_cog_m,
+                **status(self.robot_mode, self.safety, self.runtime),
+                **motion(state, self.tcp_offset, self.kinematics),
+            }
 
     def _end_program(self) -> None:
         self._program = None
         self._target = None
         self.runtime = Runtime.STOPPED
-
-    def _status(self) -> dict[str, Value]:
-        powered = self.robot_mode is Robot.RUNNING
-        playing = self.runtime is Runtime.PLAYING
-        return {
-            "robot_mode": int(self.robot_mode),
-            "safety_status_bits": int(self.safety),
-            "runtime_state": int(self.runtime),
-            "robot_status_bits": int(powered) | int(playing) << 1,
-            "tcp_offset": self.tcp_offset,
-        }
-
-    def _kinematics(self, state: ArmState) -> dict[str, Value]:
-        joints = state.joints_rad or (0.0,) * 6
-        tcp = pose_of(base_from_tcp(state.base_from_flange, self.tcp_offset))
-        return {
-            "timestamp": state.host_t_s,
-            "actual_q": joints,
-            "actual_qd": state.joint_velocity_rad_s or (0.0,) * 6,
-            "target_q": joints,
-            "actual_TCP_pose": tcp,
-            "target_TCP_pose": tcp,
-        }
 
     def _run(self) -> None:
         period_s = 1.0 / self.rate_hz

@@ -17,6 +17,7 @@ _UNLOCK_TOO_EARLY = (
     "Always inspect cause of protective stop before unlocking"
 )
 _LOCAL = "Not in remote control"
+_GOODBYE = "Disconnected"
 
 
 class Controller(Protocol):
@@ -42,8 +43,18 @@ class Controller(Protocol):
     def stop_program(self, why: str) -> None:
         """End the program and its motion."""
 
+    @property
+    def model(self) -> str:
+        """The arm's model, as the controller names it."""
+
     def play(self) -> bool:
         """Resume a paused program; return whether there was one."""
+
+    def pause(self) -> bool:
+        """Pause the program that runs, and its motion; return whether there was one."""
+
+    def power(self, mode: Robot) -> None:
+        """Switch the arm's power and brakes."""
 
     def unlock_protective_stop(self) -> bool:
         """Release a protective stop; return whether it was time."""
@@ -57,18 +68,29 @@ class DashboardServer:
         self._questions: dict[str, Callable[[], str]] = {
             "polyscopeversion": self._polyscope,
             "get serial number": lambda: "20195500001",
-            "get robot model": lambda: "UR5",
+            "get robot model": lambda: controller.model,
             "is in remote control": lambda: str(controller.remote_control).lower(),
             "robotmode": lambda: f"Robotmode: {controller.robot_mode.name}",
             "safetystatus": lambda: f"Safetystatus: {controller.safety.name}",
             "programstate": lambda: f"{controller.runtime.name} rtde_control",
             "running": lambda: f"Program running: {str(controller.runtime == 2).lower()}",
+            "safetymode": lambda: f"Safetymode: {controller.safety.name}",
+            "get loaded program": lambda: "No program loaded",
+            "isprogramsaved": lambda: "false <unnamed>",
+            "get operational mode": lambda: "NONE",
             "close safety popup": lambda: "closing safety popup",
+            "close popup": lambda: "closing popup",
         }
+        self._texts = {"popup": "showing popup", "addtolog": "Added log message"}
         self._orders: dict[str, Callable[[], str]] = {
             "stop": self._stop,
             "play": self._play,
+            "pause": self._pause,
             "unlock protective stop": self._unlock,
+            "power on": lambda: self._power(Robot.IDLE, "Powering on"),
+            "power off": lambda: self._power(Robot.POWER_OFF, "Powering off"),
+            "brake release": lambda: self._power(Robot.RUNNING, "Brake releasing"),
+            "restart safety": lambda: "Restarting safety",
         }
 
     def serve(self, link: socket.socket) -> None:
@@ -81,11 +103,17 @@ class DashboardServer:
             answer = self._answer(line.strip())
             if not self._controller.faults.mute:
                 link.sendall(f"{answer}\n".encode())
+            if answer == _GOODBYE:
+                return
 
     def _answer(self, line: str) -> str:
         command = line.lower()
         if command in self._questions:
             return self._questions[command]()
+        if command == "quit":
+            return _GOODBYE
+        if command.split(" ")[0] in self._texts:
+            return self._texts[command.split(" ")[0]]
         if command not in self._orders:
             return f"could not understand: '{line}'"
         self._controller.note(f"dashboard: {command}")
@@ -102,6 +130,13 @@ class DashboardServer:
 
     def _play(self) -> str:
         return "Starting program" if self._controller.play() else "Failed to execute: play"
+
+    def _pause(self) -> str:
+        return "Pausing program" if self._controller.pause() else "Failed to execute: pause"
+
+    def _power(self, mode: Robot, answer: str) -> str:
+        self._controller.power(mode)
+        return answer
 
     def _unlock(self) -> str:
         unlocked = self._controller.unlock_protective_stop()

@@ -7,16 +7,19 @@ were read off the wheel's own script and confirmed by running the wheel against 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import Protocol
 
+from calib.chain.kinematics import ArmKinematics
 from drivers.arm import MoveTarget
 from drivers.ur.pose import base_from_flange
+from sim.peers.ur.kinematic_answers import KinematicAnswers, NoSolution
+from sim.peers.ur.registers import ScriptRegisters
 
 READY, DONE = 1, 2
-MOVE_J, MOVE_J_IK, MOVE_L = 1, 2, 3
-SET_TCP, STOP_L, STOP_J, SET_WATCHDOG, GET_TCP_OFFSET, IS_STEADY = 29, 33, 34, 35, 40, 47
+MOVE_J, MOVE_J_IK, MOVE_L, MOVE_L_FK = 1, 2, 3, 4
+SET_PAYLOAD, SET_TCP, STOP_L, STOP_J, SET_WATCHDOG = 17, 29, 33, 34, 35
+GET_TCP_OFFSET, IS_STEADY = 40, 47
 KICK, STOP_SCRIPT = 99, 255
 _RUNNING = 1 << 15
 
@@ -26,6 +29,9 @@ class Controller(Protocol):
 
     registers: dict[str, int | float]
     tcp_offset: tuple[float, ...]
+    payload_kg: float
+    payload_cog_m: tuple[float, ...]
+    kinematics: ArmKinematics | None
 
     @staticmethod
     def now() -> float:
@@ -33,6 +39,9 @@ class Controller(Protocol):
 
     def begin_move(self, target: MoveTarget) -> None:
         """Start a motion of the program."""
+
+    def joints_rad(self) -> tuple[float, ...]:
+        """Present joint angles."""
 
     def at_rest(self) -> bool:
         """Whether the arm has come to rest."""
@@ -60,17 +69,30 @@ class ControlProgram:
 
     def __init__(self, controller: Controller, source: str) -> None:
         self._controller = controller
-        # the client puts the number behind the comment that marks its place
-        offset = re.search(r"# int register offset\s+(\d+)", source)
-        self._offset = int(offset.group(1)) if offset else 0
+        self._registers = ScriptRegisters(controller.registers, source)
+        self._kinematics = KinematicAnswers(controller, self._registers)
         self._busy: Callable[[], bool] | None = None
         self._operation = 0
         self._changes = 0
         self._async_running = False
         self._watchdog_s: float | None = None
         self._kicked_s = controller.now()
-        self._answer(READY)
-        self._set_out(2, 0)
+        self._actions: dict[int, Callable[[], None]] = {
+            MOVE_J: lambda: self._move(self._joint_target()),
+            MOVE_J_IK: lambda: self._move(self._pose_target(straight=False)),
+            MOVE_L: lambda: self._move(self._pose_target(straight=True)),
+            MOVE_L_FK: lambda: self._move(self._straight_to_joints()),
+            STOP_L: self._stop,
+            STOP_J: self._stop,
+            SET_PAYLOAD: self._set_payload,
+            SET_TCP: self._set_tcp,
+            SET_WATCHDOG: self._set_watchdog,
+            GET_TCP_OFFSET: lambda: self._registers.set_out_doubles(controller.tcp_offset),
+            IS_STEADY: lambda: self._registers.set_out(1, int(controller.steady())),
+            **self._kinematics.actions,
+        }
+        self._registers.set_out(0, READY)
+        self._registers.set_out(2, 0)
 
     def kick(self) -> None:
         """An input update for the command register came in."""
@@ -85,93 +107,77 @@ class ControlProgram:
         """One cycle of the script's main loop."""
         if self._async_running and self._controller.at_rest():
             self._progress(running=False)
+        registers = self._registers
         if self._busy is not None:
             if self._busy():
                 self._busy = None
-                self._answer(DONE)
+                registers.set_out(0, DONE)
             return
-        command = int(self._in_int(0))
-        if self._out(0) == READY and command:
+        command = registers.in_int(0)
+        if registers.out(0) == READY and command:
             self._execute(command)
-        elif self._out(0) == DONE and not command:
-            self._answer(READY)
+        elif registers.out(0) == DONE and not command:
+            registers.set_out(0, READY)
 
     def _execute(self, command: int) -> None:
         if command == STOP_SCRIPT:
             self._controller.stop_program("script ended by its client")
             return
-        actions: dict[int, Callable[[int], None]] = {
-            MOVE_J: self._move,
-            MOVE_J_IK: self._move,
-            MOVE_L: self._move,
-            STOP_L: self._stop,
-            STOP_J: self._stop,
-            SET_TCP: self._set_tcp,
-            SET_WATCHDOG: self._set_watchdog,
-            GET_TCP_OFFSET: self._get_tcp,
-            IS_STEADY: self._is_steady,
-        }
-        if command in actions:
-            actions[command](command)
+        try:
+            self._actions.get(command, lambda: None)()
+        except NoSolution as none:
+            self._controller.stop_program(f"runtime error in the script: {none}")
+            return
         if self._busy is None:
-            self._answer(DONE)
+            self._registers.set_out(0, DONE)
 
-    def _move(self, command: int) -> None:
+    def _speed(self) -> float:
+        return self._registers.in_doubles(6, 1)[0]
+
+    def _joint_target(self) -> MoveTarget:
+        joints = self._registers.in_doubles(0)
+        return MoveTarget(joints_rad=joints, joint_speed_rad_s=self._speed(), tcp_speed_m_s=10.0)
+
+    def _pose_target(self, *, straight: bool) -> MoveTarget:
+        pose = self._registers.in_doubles(0)
+        return MoveTarget(
+            base_from_flange=base_from_flange(pose, self._controller.tcp_offset),
+            tcp_speed_m_s=self._speed() if straight else 10.0,
+            joint_speed_rad_s=3.14 if straight else self._speed(),
+        )
+
+    def _straight_to_joints(self) -> MoveTarget:
+        return MoveTarget(
+            base_from_flange=self._kinematics.forward(self._registers.in_doubles(0)),
+            tcp_speed_m_s=self._speed(),
+            joint_speed_rad_s=3.14,
+        )
+
+    def _move(self, target: MoveTarget) -> None:
         controller = self._controller
-        numbers, speed = self._in_doubles(0, 6), float(self._in_doubles(6, 1)[0])
-        if command == MOVE_J:
-            target = MoveTarget(joints_rad=numbers, joint_speed_rad_s=speed, tcp_speed_m_s=10.0)
-        else:
-            target = MoveTarget(
-                base_from_flange=base_from_flange(numbers, controller.tcp_offset),
-                tcp_speed_m_s=speed if command == MOVE_L else 10.0,
-                joint_speed_rad_s=3.14 if command == MOVE_L else speed,
-            )
         controller.begin_move(target)
-        if self._in_int(1):
+        if self._registers.in_int(1):
             self._operation = (self._operation + 1) % 128
             self._progress(running=True)
         else:
             self._busy = controller.at_rest
 
-    def _stop(self, command: int) -> None:
-        self._controller.stop_motion(f"script command {command}")
+    def _stop(self) -> None:
+        self._controller.stop_motion("script's own stop")
         self._busy = self._controller.at_rest
 
-    def _set_tcp(self, _: int) -> None:
-        self._controller.tcp_offset = self._in_doubles(0, 6)
+    def _set_payload(self) -> None:
+        mass, *centre = self._registers.in_doubles(0, 4)
+        self._controller.payload_kg, self._controller.payload_cog_m = mass, tuple(centre)
 
-    def _get_tcp(self, _: int) -> None:
-        for index, value in enumerate(self._controller.tcp_offset):
-            name = f"output_double_register_{index + self._offset}"
-            self._controller.registers[name] = value
+    def _set_tcp(self) -> None:
+        self._controller.tcp_offset = self._registers.in_doubles(0)
 
-    def _is_steady(self, _: int) -> None:
-        self._set_out(1, int(self._controller.steady()))
-
-    def _set_watchdog(self, _: int) -> None:
-        self._watchdog_s = 1.0 / self._in_doubles(0, 1)[0]
+    def _set_watchdog(self) -> None:
+        self._watchdog_s = 1.0 / self._registers.in_doubles(0, 1)[0]
 
     def _progress(self, *, running: bool) -> None:
         self._async_running = running
         self._changes = (self._changes + 1) % 128
         word = (self._operation << 24) | (self._changes << 16) | (_RUNNING if running else 0)
-        self._set_out(2, word)
-
-    def _answer(self, value: int) -> None:
-        self._set_out(0, value)
-
-    def _in_int(self, index: int) -> int:
-        name = f"input_int_register_{index + self._offset}"
-        return int(self._controller.registers.get(name, 0))
-
-    def _in_doubles(self, first: int, count: int) -> tuple[float, ...]:
-        start = first + self._offset
-        names = (f"input_double_register_{index}" for index in range(start, start + count))
-        return tuple(float(self._controller.registers.get(name, 0.0)) for name in names)
-
-    def _out(self, index: int) -> int:
-        return int(self._controller.registers[f"output_int_register_{index + self._offset}"])
-
-    def _set_out(self, index: int, value: int) -> None:
-        self._controller.registers[f"output_int_register_{index + self._offset}"] = value
+        self._registers.set_out(2, word)

@@ -12,20 +12,8 @@ from typing import Protocol
 
 from drivers.ur.wire import Frame, Recipe, Value, encode, receive
 from sim.peers.ur.faults import URFaults
+from sim.peers.ur.variables import OUTPUT_TYPES, nothing
 
-_OUTPUTS = {
-    "timestamp": "DOUBLE",
-    "actual_q": "VECTOR6D",
-    "actual_qd": "VECTOR6D",
-    "target_q": "VECTOR6D",
-    "actual_TCP_pose": "VECTOR6D",
-    "target_TCP_pose": "VECTOR6D",
-    "tcp_offset": "VECTOR6D",
-    "robot_mode": "INT32",
-    "safety_status_bits": "UINT32",
-    "robot_status_bits": "UINT32",
-    "runtime_state": "UINT32",
-}
 _INPUTS = {"external_force_torque": "VECTOR6D"}
 _REGISTER = re.compile(r"(input|output)_(int|double)_register_(\d+)")
 _REGISTER_TYPES = {"int": "INT32", "double": "DOUBLE"}
@@ -90,7 +78,11 @@ class RtdeServer:
             # a client that did not get its registers may write to them all the same
             if 1 <= payload[0] <= len(client.inputs):
                 recipe = client.inputs[payload[0] - 1]
-                self._controller.write_inputs(recipe.unpack(payload[1:]))
+                # ur-rtde 1.6.5 sends getForwardKinematics(q, tcp_offset) on a recipe of half the
+                # length; what the recipe has no names for is taken as not there
+                body = payload[1 : 1 + recipe.size]
+                if len(body) == recipe.size:
+                    self._controller.write_inputs(recipe.unpack(body))
             return
         answer = self._answer(client, kind, payload)
         if not self._controller.faults.mute:
@@ -122,7 +114,7 @@ class RtdeServer:
 
     def _output_type(self, name: str) -> str:
         unknown = name in self._controller.faults.missing_outputs
-        return "NOT_FOUND" if unknown else _type_of(name, _OUTPUTS)
+        return "NOT_FOUND" if unknown else _type_of(name, OUTPUT_TYPES)
 
     def _input_type(self, client: _Client, name: str) -> str:
         others = (other for other in self._clients if other is not client)
@@ -144,4 +136,7 @@ def _type_of(name: str, known: dict[str, str]) -> str:
 
 
 def _complete(recipe: Recipe, values: dict[str, Value]) -> dict[str, Value]:
-    return {name: values.get(name, 0) for name in recipe.names}
+    return {
+        name: values[name] if name in values else nothing(OUTPUT_TYPES.get(name, ""))
+        for name in recipe.names
+    }

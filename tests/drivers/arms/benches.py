@@ -66,9 +66,9 @@ def simulated(model: str, home: tuple[float, ...]) -> SimArm:
 
 
 @contextmanager
-def ur_peer() -> Iterator[tuple[URController, SimArm]]:
-    sim = simulated("ur5e", UR_HOME)
-    with URController(sim, own_address(), kinematics=kinematics_of("ur5e")) as controller:
+def ur_peer(model: str = "ur5e") -> Iterator[tuple[URController, SimArm]]:
+    sim = simulated(model, UR_HOME)
+    with URController(sim, own_address(), kinematics=kinematics_of(model)) as controller:
         yield controller, sim
 
 
