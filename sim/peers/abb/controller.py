@@ -16,12 +16,13 @@ from sim.peers.abb.event_log import EventLog
 from sim.peers.abb.http_server import RwsServer
 from sim.peers.abb.motion_program import BadProgram, Wait, decode
 from sim.peers.abb.panel import ABBFaults, PanelState
+from sim.peers.abb.panel_services import RAMDISK
 from sim.peers.controller_faults import Reported, StopOrders
 from sim.peers.events import Event
 
-RAMDISK = "RAMDISK"
 PROGRAM_FILE = f"{RAMDISK}/motion_program.bin"
 _POLL_S = 0.004
+_SLOWEST = 0.01
 
 
 class ABBController:
@@ -52,6 +53,8 @@ class ABBController:
         Where the arm is mounted; work objects and EGM refer to the world.
     flange_from_active_tool:
         What RWS takes for the tool where a request names none.
+    signals, rapid_data:
+        Inputs and outputs by network, unit and name; persistent variables by task, module, name.
     watch:
         The background task that stops the motion when nobody vouches for it.
     events, request_times_s:
@@ -76,6 +79,8 @@ class ABBController:
         self.reported = Reported(arm.state, lambda: self.faults)
         self.stop_orders = StopOrders(lambda: self.faults, self.halt, self.note)
         self.files: dict[str, bytes] = {}
+        self.signals: dict[str, float] = {"Local/DRV_1/DRV1BRAKE": 1.0}
+        self.rapid_data: dict[str, str] = {}
         self.log = EventLog()
         self.events: list[Event] = []
         self.request_times_s: list[float] = []
@@ -197,6 +202,14 @@ class ABBController:
         pose = self.world_from_base.inv() * target.base_from_flange
         return replace(target, base_from_flange=pose)
 
+    def _slowed(self, target: MoveTarget) -> MoveTarget:
+        share = max(self.panel.speed_ratio / 100.0, _SLOWEST)
+        return replace(
+            target,
+            tcp_speed_m_s=target.tcp_speed_m_s * share,
+            joint_speed_rad_s=target.joint_speed_rad_s * share,
+        )
+
     def _execute(self, command: MoveTarget | Wait) -> None:
         if isinstance(command, Wait):
             self._stop_rapid.wait(command.duration_s)
@@ -204,6 +217,6 @@ class ABBController:
         with self._lock:
             if self._stop_rapid.is_set():
                 return
-            self.arm.start_move(self._in_base(command))
+            self.arm.start_move(self._slowed(self._in_base(command)))
         while self.arm.state().motion is Motion.MOVING and not self._stop_rapid.is_set():
             time.sleep(_POLL_S)

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
+from sim.peers.abb.answers import Answer, error
 from sim.peers.abb.digest import DigestLogin
-from sim.peers.abb.resources import Answer, Controller, Resources, error
+from sim.peers.abb.resources import Controller, Resources
 from sim.peers.http import DroppableServer
 
 CERTIFICATE = Path(__file__).with_name("certificate.pem")

@@ -9,10 +9,11 @@ from sim.peers.controller_faults import ControllerFaults
 
 @dataclass
 class PanelState:
-    """``controller`` is RWS's ctrlstate, ``mode`` its opmode."""
+    """``controller`` is RWS's ctrlstate, ``mode`` its opmode, ``speed_ratio`` in percent."""
 
     controller: str = "motoron"
     mode: str = "AUTO"
+    speed_ratio: float = 100.0
 
 
 @dataclass

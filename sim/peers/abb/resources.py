@@ -4,59 +4,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Protocol
-from urllib.parse import parse_qs
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from drivers.abb.units import millimetres, scalar_first
 from drivers.arm import ArmState
-from sim.peers.abb.cell_watch import CellWatch
+from sim.peers.abb import panel_services
+from sim.peers.abb.answers import DONE, NOT_ALLOWED, Answer, error, missing, state
 from sim.peers.abb.event_log import EventLog
-from sim.peers.abb.panel import ABBFaults, PanelState
+from sim.peers.abb.panel import ABBFaults
+from sim.peers.abb.panel_services import RAMDISK, PanelServices
 from sim.peers.controller_faults import StopOrders
 
 _UNUSED_AXIS = "9E+09"
-_FILES = "fileservice/"
-_RAMDISK = "RAMDISK"
-_WATCH = "rw/rapid/symbol/data/RAPID/T_CELL_WATCH/cell_watch/cell_watch_"
 
 
-@dataclass(frozen=True)
-class Answer:
-    """Status and body of an HTTP answer; bytes are sent as they are, the rest as JSON."""
-
-    status: int
-    body: Any = b""
-    kind: str | None = None
-    """Content type, where it does not follow from the body."""
-    headers: tuple[tuple[str, str], ...] = ()
-
-
-def state(*entries: dict[str, Any]) -> Answer:
-    """Return an answer with RWS's envelope."""
-    return Answer(200, {"_links": {}, "_embedded": {"_state": list(entries)}})
-
-
-def error(status: int, code: int, message: str) -> Answer:
-    """Return an answer that refuses."""
-    return Answer(status, {"_embedded": {"status": {"code": code, "msg": message}}})
-
-
-_NOT_ALLOWED = error(403, -1073442809, "operation not allowed in this controller state")
-
-
-class Controller(Protocol):
+class Controller(panel_services.Controller, Protocol):
     """What the resources tell of their controller, and what they order."""
 
     running: bool
-    panel: PanelState
     faults: ABBFaults
-    files: dict[str, bytes]
     log: EventLog
-    watch: CellWatch
     request_times_s: list[float]
     world_from_base: RigidTransform
     flange_from_active_tool: RigidTransform
@@ -84,6 +54,7 @@ class Resources:
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
+        self._services = PanelServices(controller)
         units = "rw/motionsystem/mechunits/ROB_1"
         self._robtarget_path = f"{units}/robtarget"
         self._gets: dict[str, Callable[[], Answer]] = {
@@ -93,14 +64,14 @@ class Resources:
             "rw/rapid/execution": self._execution,
             "rw/rapid/tasks": self._tasks,
             "rw/elog/0": lambda: state(*controller.log.entries()),
-            "ctrl/$RAMDISK": lambda: state({"_type": "ctrl-env", "_value": _RAMDISK}),
+            "ctrl/$RAMDISK": lambda: state({"_type": "ctrl-env", "_value": RAMDISK}),
             f"{units}/jointtarget": self._jointtarget,
         }
         self._posts: dict[tuple[str, str], Callable[[], Answer]] = {
             ("rw/rapid/execution", "start"): self._start,
             ("rw/rapid/execution", "stop"): self._stop,
-            ("rw/rapid/execution", "resetpp"): lambda: Answer(204),
-            ("rw/rapid/tasks/T_ROB1", "activate"): lambda: Answer(204),
+            ("rw/rapid/execution", "resetpp"): lambda: DONE,
+            ("rw/rapid/tasks/T_ROB1", "activate"): lambda: DONE,
             ("rw/panel/ctrlstate", "setctrlstate"): self._motors_off,
         }
 
@@ -111,10 +82,9 @@ class Resources:
     def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> Answer:
         """Return what a request gets."""
         self._controller.request_times_s.append(time.monotonic())
-        if path.startswith(_FILES):
-            return self._file(method, path.removeprefix(_FILES), body)
-        if path.startswith(_WATCH) and self._controller.watch.loaded:
-            return self._watched(method, path.removeprefix(_WATCH), body)
+        answered = self._services.answer(method, path, query, body)
+        if answered is not None:
+            return answered
         if method == "GET" and path == self._robtarget_path:
             return self._robtarget(query)
         if method == "GET" and path in self._gets:
@@ -122,7 +92,7 @@ class Resources:
         action = (path, query.get("action", ""))
         if method == "POST" and action in self._posts:
             return self._posts[action]()
-        return error(404, -1073445865, f"no such resource: {path}")
+        return missing(path)
 
     def _execution(self) -> Answer:
         running = "running" if self._controller.running else "stopped"
@@ -163,42 +133,23 @@ class Resources:
         controller = self._controller
         controller.note("rws: start")
         if controller.panel.mode != "AUTO" or controller.panel.controller != "motoron":
-            return _NOT_ALLOWED
+            return NOT_ALLOWED
         if controller.running:
             return error(403, -1073442812, "RAPID is executing")
         controller.start()
-        return Answer(204)
+        return DONE
 
     def _stop(self) -> Answer:
         self._controller.note("rws: stop")
         if self._controller.stop_orders.refused or self._controller.faults.rapid_stop_refused:
-            return _NOT_ALLOWED
+            return NOT_ALLOWED
         self._controller.stop("rws stop")
-        return Answer(204)
+        return DONE
 
     def _motors_off(self) -> Answer:
         self._controller.note("rws: motors off")
         if self._controller.stop_orders.refused:
-            return _NOT_ALLOWED
+            return NOT_ALLOWED
         self._controller.panel.controller = "motoroff"
         self._controller.stop("motors off")
-        return Answer(204)
-
-    def _watched(self, method: str, name: str, body: bytes) -> Answer:
-        values = self._controller.watch.values
-        if method == "GET":
-            return state({"_type": "rap-data", "value": f"{values[name]:g}"})
-        values[name] = float(parse_qs(body.decode())["value"][0])
-        return Answer(204)
-
-    def _file(self, method: str, name: str, body: bytes) -> Answer:
-        files = self._controller.files
-        if method == "PUT":
-            files[name] = body
-            return Answer(201)
-        if name not in files:
-            return error(404, -1073414146, f"no such file: {name}")
-        if method == "DELETE":
-            del files[name]
-            return Answer(204)
-        return Answer(200, files[name])
+        return DONE

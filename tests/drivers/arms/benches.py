@@ -62,7 +62,10 @@ def own_address() -> str:
 
 
 def simulated(model: str, home: tuple[float, ...]) -> SimArm:
-    return SimArm(kinematics_of(model), WallClock(), np.array(home))
+    arm = SimArm(kinematics_of(model), WallClock(), np.array(home))
+    arm.connect()
+    arm.state()  # its kinematics are compiled now, not while a driver waits for an answer
+    return arm
 
 
 @contextmanager

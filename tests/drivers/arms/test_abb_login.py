@@ -16,7 +16,7 @@ from drivers.abb.rws import open_rws
 from drivers.abb.transport import LARGEST_ANSWER_BYTES, certificate_of, resolved
 from drivers.errors import DeviceError, DeviceRefused
 from sim.peers.abb import ABBController
-from sim.peers.abb.resources import Answer
+from sim.peers.abb.answers import Answer
 
 SECRET = "open-sesame-4711"
 
