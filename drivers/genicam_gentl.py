@@ -3,7 +3,8 @@
 `harvesters` and `genicam` are an extra (`pip install calibration-cell[genicam]`); the producer, a
 `.cti` file, comes with the grabber. Guarded here: a fetch without time-out blocks for ever, a
 buffer's memory changes once it is queued again, an incomplete buffer is dropped without a word,
-fields that a producer does not fill raise, one process may load a producer only once.
+fields that a producer does not fill raise, one process may load a producer only once, and a
+container of parts (GenDC) is shown as one image that begins with the container's header.
 """
 
 from __future__ import annotations
@@ -195,6 +196,7 @@ class GenTLSession:
                 raise DeviceRefused(f"{self._name}: {producer} is no producer: {error}") from None
 
     def _copy(self, buffer: Any) -> RawFrame:
+        self._require_image(buffer)
         components = buffer.payload.components
         if not components or components[0].width == 0:
             raise IncompleteFrame("a buffer came without an image")
@@ -207,6 +209,16 @@ class GenTLSession:
             device_timestamp_ns=self._optional(buffer, "timestamp_ns"),
             raw={"frame_id": self._optional(buffer.module, "frame_id")},
         )
+
+    def _require_image(self, buffer: Any) -> None:
+        """Refuse a container: harvesters shows a GenDC one as an image, header and all."""
+        kind = self._optional(buffer.module, "payload_type")
+        if kind != int(self._gentl.PAYLOADTYPE_INFO_IDS.PAYLOAD_TYPE_IMAGE):
+            raise DeviceRefused(
+                f"{self._name}: sends payloads of GenTL type {kind}, not plain images. Switch "
+                "GenDC, chunk and multi-part streaming off: `features: {GenDCStreamingMode: "
+                "'Off'}`, `{ChunkModeActive: false}` or the like in the cell file"
+            )
 
     def _optional(self, owner: Any, field: str) -> int | None:
         try:

@@ -27,15 +27,15 @@ class Feature:
     Attributes
     ----------
     kind:
-        `integer`, `float`, `enumeration` or `command`.
+        `integer`, `float`, `enumeration`, `command` or `string`.
     access:
         RO, RW or WO.
     default, low, high, unit:
         Start value and range, in the feature's own unit.
     entries:
         Values of an enumeration by name.
-    address:
-        A fixed (bootstrap) register, or None: the device lays it out itself.
+    address, width:
+        A fixed (bootstrap) register and, of a string, its bytes; None: the device lays it out.
     locked_while_streaming:
         The device refuses to write it during an acquisition.
     """
@@ -50,11 +50,14 @@ class Feature:
     access: str = "RW"
     entries: dict[str, int] = field(default_factory=dict)
     address: int | None = None
+    width: int = 0
     locked_while_streaming: bool = False
 
     @property
     def length(self) -> int:
         """Bytes of its register."""
+        if self.kind == "string":
+            return self.width
         return 8 if self.kind == "float" else 4
 
     def pack(self, value: Value) -> bytes:
@@ -92,6 +95,12 @@ def device_features(width: int, height: int) -> tuple[Feature, ...]:
     image, acquisition = "ImageFormatControl", "AcquisitionControl"
     transport, info = "TransportLayerControl", "DeviceControl"
     return (
+        _text("DeviceVendorName", 0x0048, 32),
+        _text("DeviceModelName", 0x0068, 32),
+        _text("DeviceVersion", 0x0088, 32),
+        _text("DeviceManufacturerInfo", 0x00A8, 48),
+        _text("DeviceSerialNumber", 0x00D8, 16),
+        _text("DeviceUserID", 0x00E8, 16),
         Feature("DeviceTemperature", info, "float", 35.0, unit="C", access="RO"),
         Feature("Width", image, "integer", width, 16, width, locked_while_streaming=True),
         Feature("Height", image, "integer", height, 16, height, locked_while_streaming=True),
@@ -137,6 +146,11 @@ def _fixed(name: str, address: int, high: int) -> Feature:
     return Feature(name, "TransportLayerControl", "integer", low=0, high=high, address=address)
 
 
+def _text(name: str, address: int, width: int) -> Feature:
+    """A name of the device; hosts read it, in the discovery answer too."""
+    return Feature(name, "DeviceControl", "string", access="RO", address=address, width=width)
+
+
 def xml_of(layout: dict[int, Feature], model: str) -> bytes:
     """The GenICam description of features laid out at those addresses."""
     categories: dict[str, list[str]] = {}
@@ -167,6 +181,8 @@ def _category(name: str, members: dict[str, list[str]] | list[str]) -> str:
 
 def _feature_node(feature: Feature) -> str:
     value = f"<pValue>{feature.name}Register</pValue>"
+    if feature.kind == "string":
+        return ""  # its register is its node
     if feature.kind == "command":
         return f'<Command Name="{feature.name}">{value}<CommandValue>1</CommandValue></Command>'
     if feature.kind == "enumeration":
@@ -188,6 +204,12 @@ def _range(feature: Feature) -> str:
 
 
 def _register_node(feature: Feature, address: int) -> str:
+    if feature.kind == "string":
+        return (
+            f'<StringReg Name="{feature.name}"><Address>0x{address:X}</Address>'
+            f"<Length>{feature.length}</Length><AccessMode>{feature.access}</AccessMode>"
+            "<pPort>Device</pPort></StringReg>"
+        )
     tag = "FloatReg" if feature.kind == "float" else "IntReg"
     sign = "" if tag == "FloatReg" else "<Sign>Unsigned</Sign>"
     return (

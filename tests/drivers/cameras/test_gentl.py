@@ -8,10 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from genicam import gentl
+from harvesters.core import Harvester
 
 from drivers.errors import DeviceRefused
 from drivers.genicam import GenTLCamera
 from drivers.genicam_camera import GenICamOptions
+from drivers.genicam_gentl import GenTLSession
 from drivers.genicam_pixels import decode
 from drivers.genicam_settings import FeatureNames
 from tests.drivers.cameras.rigs import VIKY
@@ -122,3 +125,48 @@ def test_bayer_patterns_give_the_colour_that_their_name_says(
 def test_a_buffer_of_the_wrong_length_is_no_image() -> None:
     with pytest.raises(ValueError, match="reshape"):
         decode(bytes(99), 10, 10, "Mono8")
+
+
+def test_a_container_is_refused_although_harvesters_shows_it_as_an_image() -> None:
+    options = GenICamOptions(software_trigger=False, features={"GenDCStreamingMode": "On"})
+    camera = GenTLCamera(VIKY, {"serial_number": "0"}, options)
+    camera.connect()
+    with pytest.raises(DeviceRefused, match="GenTL type 11, not plain images"):
+        camera.grab(5.0)
+    camera.close()
+
+
+def test_what_harvesters_shows_of_a_container_begins_with_its_header() -> None:
+    # the hazard itself, so that the test above means something
+    harvester = Harvester()
+    harvester.add_file(VIKY)
+    harvester.update()
+    acquirer = harvester.create({"serial_number": "0"})
+    acquirer.remote_device.node_map.GenDCStreamingMode.value = "On"
+    acquirer.start()
+    buffer = acquirer.fetch(timeout=5.0)
+    [component] = buffer.payload.components
+    assert component.data_format == "RGBa8"
+    assert component.data[:4].tobytes() == b"GNDC"
+    buffer.queue()
+    acquirer.stop()
+    acquirer.destroy()
+    harvester.reset()
+
+
+@pytest.mark.parametrize("kind", ["CHUNK_DATA", "MULTI_PART", "GENDC", "JPEG", "UNKNOWN"])
+def test_every_payload_but_a_plain_image_is_refused(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    number = getattr(gentl.PAYLOADTYPE_INFO_IDS, f"PAYLOAD_TYPE_{kind}")
+    true_optional = GenTLSession._optional
+
+    def optional(self: GenTLSession, owner: object, field: str) -> int | None:
+        return int(number) if field == "payload_type" else true_optional(self, owner, field)
+
+    monkeypatch.setattr(GenTLSession, "_optional", optional)
+    camera = GenTLCamera(VIKY, {"serial_number": "0"}, STREAMING)
+    camera.connect()
+    with pytest.raises(DeviceRefused, match="not plain images"):
+        camera.grab(5.0)
+    camera.close()
