@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,10 +13,17 @@ from calib.calibration.result import Rejection
 from calib.chain import rigid
 from calib.discovery.log_consistency.consistency import mounted_from_fixed
 from calib.discovery.log_consistency.conventions import find_conventions
+from calib.discovery.log_consistency.corner_orders import find_corner_orders
+from calib.discovery.log_consistency.frame_steps import find_frame_step
+from calib.discovery.log_consistency.frozen import find_frozen_poses
+from calib.discovery.log_consistency.joint_readings import find_degrees, find_joint_signs
+from calib.discovery.log_consistency.mirror import find_mirror
 from calib.discovery.log_consistency.mixup import ROBOT_COLUMNS, Mixup
+from calib.discovery.log_consistency.odd_frames import find_odd_frames
 from calib.discovery.log_consistency.pairing import find_pairing
 from calib.discovery.log_consistency.recover import recover_joints, recover_poses
 from calib.discovery.log_consistency.robot_model import find_robot_model
+from calib.discovery.log_consistency.single_units import find_single_units
 from calib.discovery.log_consistency.which_arm import recognise_arm
 from calib.discovery.start import FreeViews, free_views
 from calib.errors import CalibrationError
@@ -73,48 +81,93 @@ def repair_log(views: Views, log: Views) -> LogRepair:
     CalibrationError
         When the pictures themselves cannot be calibrated.
     """
-    baseline = fit_baseline(views, usable_frames(views))
-    free = free_views(baseline, views.height_px)
-    loop = mounted_from_fixed(free.camera_from_board, views.mount)
-    rejected = list(baseline.rejected)
+    return _repaired(_Log(views, log), renumbered=False)
+
+
+class _Log:
+    """The frames and every row of the log as they are mended, and what was."""
+
+    def __init__(self, views: Views, log: Views) -> None:
+        self.views, self.log = views, log
+        self.mixups: list[Mixup] = []
+        self.said: list[str] = []
+
+    def mend(self, mixup: Mixup | None) -> bool:
+        """Mend what was found; False where nothing was."""
+        if mixup is None:
+            return False
+        self.mixups.append(mixup)
+        self.views, self.log = mixup.mend(self.views, self.log), mixup.mend(self.log, self.log)
+        return True
+
+    def fill_in(self) -> None:
+        """Name the arm and work out poses that were not logged."""
+        self.mend(find_degrees(self.views))
+        self.views, arm_said = recognise_arm(self.views)
+        self.log = replace(self.log, robot_model=self.views.robot_model)
+        recovered = recover_poses(self.views)
+        self.views, self.log = recovered.views, recover_poses(self.log).views
+        self.said += [*recovered.said, *([] if arm_said is None else [arm_said])]
+
+    def fill_in_joints(self) -> bool:
+        """Work out joints that were not logged; False where there were none."""
+        logged = bool(np.isfinite(self.log.joints_rad).any())
+        worked_out = recover_joints(self.log)
+        self.log = worked_out.views
+        self.said += worked_out.said
+        self.views = _rows_of(self.views, self.log)
+        return logged
+
+
+def _repaired(repair: _Log, *, renumbered: bool) -> LogRepair:
+    """Mend the log; once more from the pictures on where their corners were renumbered."""
+    baseline = fit_baseline(repair.views, usable_frames(repair.views))
+    free = free_views(baseline, repair.views.height_px)
+    loop = mounted_from_fixed(free.camera_from_board, repair.views.mount)
     good = np.asarray(np.isfinite(free.camera_from_board).all(axis=(1, 2)))
-    views, arm_said = recognise_arm(views)
-    log = replace(log, robot_model=views.robot_model)
-    recovered = recover_poses(views)
-    views, log, said = recovered.views, recover_poses(log).views, list(recovered.said)
-    said += [] if arm_said is None else [arm_said]
-    if int((views.has_pose & good).sum()) < FEWEST_FRAMES:
-        said.append("no robot poses: what a free camera pose can absorb cannot be seen")
-        views = _without_robot(views, free)
-        return _log_repair(views, log, free, [], rejected, said, False, good, True)
-    mixups: list[Mixup] = []
-    views, log, loop_mixups = _mend_conventions(views, log, loop)
-    mixups += loop_mixups
-    joints_logged = bool(np.isfinite(log.joints_rad).any())
-    worked_out = recover_joints(log)
-    log, said = worked_out.views, [*said, *worked_out.said]
-    views = _rows_of(views, log)
-    model = find_robot_model(views, loop)
-    if model is not None:
-        mixups.append(model)
-        views, log = model.mend(views, log), model.mend(log, log)
-    pairing = find_pairing(views, log, loop)
+    if not renumbered:
+        repair.fill_in()
+    if int((repair.views.has_pose & good).sum()) < FEWEST_FRAMES:
+        repair.said.append("no robot poses: what a free camera pose can absorb cannot be seen")
+        repair.views = _without_robot(repair.views, free)
+        return _log_repair(repair, free, list(baseline.rejected), False, good, True)
+    frozen = find_frozen_poses(repair.views, loop)
+    repair.mend(frozen)
+    mirrored = not renumbered and not _mend_conventions(repair, loop)
+    if mirrored and repair.mend(find_mirror(repair.views, loop)):
+        return _repaired(repair, renumbered=True)
+    joints_logged = repair.fill_in_joints()
+    repair.mend(find_joint_signs(repair.views))
+    if not repair.mend(find_frame_step(repair.views, loop)):
+        repair.mend(find_robot_model(repair.views, loop))
+    odd = find_odd_frames(repair.views, repair.log, loop)
+    if odd is not None and not renumbered:
+        if repair.mend(find_corner_orders(repair.views, odd, free.camera_from_board)):
+            return _repaired(repair, renumbered=True)
+        repair.mend(find_single_units(repair.views, odd, loop))
+        odd = find_odd_frames(repair.views, repair.log, loop)
+    pairing = find_pairing(repair.views, repair.log, loop, odd)
     for mixup in pairing.mixups:
-        mixups.append(mixup)
-        views, log = mixup.mend(views, log), mixup.mend(log, log)
-    rejected += [Rejection(f, "its pose belongs to no picture") for f in pairing.dropped]
-    rejected += [
-        Rejection(int(f), "no flange pose")
-        for f, has in zip(views.frame, views.has_pose, strict=True)
-        if not has
-    ]
-    kept = good & views.has_pose & ~np.isin(views.frame, pairing.dropped)
+        repair.mend(mixup)
+    rejected = [*baseline.rejected, *_without_pose(repair.views, pairing.dropped)]
+    kept = good & repair.views.has_pose & ~np.isin(repair.views.frame, pairing.dropped)
     if kept.sum() < FEWEST_FRAMES:
         raise CalibrationError(
             f"only {int(kept.sum())} frames have a board and a flange pose that belong together;"
             f" a diagnosis needs {FEWEST_FRAMES}"
         )
-    return _log_repair(views, log, free, mixups, rejected, said, True, kept, joints_logged)
+    return _log_repair(repair, free, rejected, True, kept, joints_logged)
+
+
+def _without_pose(views: Views, dropped: Sequence[int]) -> list[Rejection]:
+    return [
+        *(Rejection(frame, "its pose belongs to no picture") for frame in dropped),
+        *(
+            Rejection(int(frame), "no flange pose of its own")
+            for frame, has in zip(views.frame, views.has_pose, strict=True)
+            if not has
+        ),
+    ]
 
 
 def _rows_of(views: Views, log: Views) -> Views:
@@ -124,13 +177,12 @@ def _rows_of(views: Views, log: Views) -> Views:
     return replace(views, **{name: getattr(log, name)[row] for name in ROBOT_COLUMNS})
 
 
-def _mend_conventions(
-    views: Views, log: Views, loop: FloatArray
-) -> tuple[Views, Views, list[Mixup]]:
-    found = find_conventions(views, loop)
+def _mend_conventions(repair: _Log, loop: FloatArray) -> bool:
+    """Read rotations and lengths as they were written; False where nothing was mended."""
+    found = find_conventions(repair.views, loop)
     for mixup in found.mixups:
-        views, log = mixup.mend(views, log), mixup.mend(log, log)
-    return views, log, list(found.mixups)
+        repair.mend(mixup)
+    return bool(found.mixups)
 
 
 def _without_robot(views: Views, free: FreeViews) -> Views:
@@ -141,24 +193,21 @@ def _without_robot(views: Views, free: FreeViews) -> Views:
 
 
 def _log_repair(
-    views: Views,
-    log: Views,
+    repair: _Log,
     free: FreeViews,
-    mixups: list[Mixup],
     rejected: list[Rejection],
-    said: list[str],
     has_robot: bool,
     kept: BoolArray,
     joints_logged: bool,
 ) -> LogRepair:
     kept_free = replace(free, camera_from_board=free.camera_from_board[kept])
     return LogRepair(
-        views.take(np.flatnonzero(kept)),
-        log,
+        repair.views.take(np.flatnonzero(kept)),
+        repair.log,
         kept_free,
-        tuple(mixups),
+        tuple(repair.mixups),
         tuple(rejected),
-        tuple(said),
+        tuple(repair.said),
         has_robot,
         joints_logged,
     )

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from calib.chain import rigid
 from calib.chain.kinematics import arm
@@ -14,7 +15,7 @@ from calib.discovery.log_repair import LogRepair, repair_log
 from calib.views import FloatArray, Views
 from cell.devices.log_mixups import _scalar_first, slip
 from cell.storage.files.cell_file import EffectFile
-from tests.discovery.simulated_runs import log, plain_cell, record
+from tests.discovery.simulated_runs import BOARD, log, plain_cell, record
 
 CLEAN = record(plain_cell(), log(30), seed=41)
 
@@ -146,3 +147,84 @@ def test_an_offset_of_more_than_half_of_the_frames_is_one_of_those_frames():
     mixup = only(found)
     assert mixup.parameters["from_frame"][0] == CLEAN.frame[10]
     np.testing.assert_allclose(found.views.base_from_flange, true_poses(rows))
+
+
+def test_a_pose_that_froze_is_told_and_its_frames_are_left_out():
+    poses = CLEAN.base_from_flange.copy()
+    poses[12:20] = poses[11]
+    found = log_repair_of(replace(CLEAN, base_from_flange=poses))
+    assert only(found).name == "stale_poses"
+    assert only(found).parameters["from_frame"][0] == CLEAN.frame[12]
+    assert only(found).parameters["to_frame"][0] == CLEAN.frame[19]
+    np.testing.assert_array_equal(found.views.frame, np.delete(CLEAN.frame, range(12, 20)))
+
+
+@pytest.mark.parametrize("at", [9, 21])
+@pytest.mark.parametrize("side", ["tool", "base"])
+def test_a_tool_or_base_frame_that_was_set_midway_is_told_with_frame_and_size(side, at):
+    change = rigid.from_vector(np.array([0.01, -0.02, 0.12, 0.0, 0.3, 0.1]))
+    poses = CLEAN.base_from_flange.copy()
+    poses[at:] = poses[at:] @ change if side == "tool" else change @ poses[at:]
+    found = log_repair_of(replace(CLEAN, base_from_flange=poses))
+    mixup = only(found)
+    assert mixup.name == f"{side}_frame_step"
+    assert mixup.alike == ("mount_slip" if side == "tool" else "board_slip",)
+    assert mixup.parameters["at_frame"][0] == CLEAN.frame[at]
+    np.testing.assert_allclose(found.views.base_from_flange, CLEAN.base_from_flange, atol=2e-3)
+
+
+def test_joints_in_degrees_are_read_as_such():
+    found = log_repair_of(replace(CLEAN, joints_rad=np.rad2deg(CLEAN.joints_rad)))
+    assert only(found).name == "angle_unit"
+    np.testing.assert_allclose(found.views.joints_rad, CLEAN.joints_rad)
+
+
+@pytest.mark.parametrize("turned", [[2], [1, 4]])
+def test_the_sign_of_a_joint_is_told_by_the_poses(turned):
+    joints = CLEAN.joints_rad.copy()
+    joints[:, turned] *= -1.0
+    found = log_repair_of(replace(CLEAN, joints_rad=joints))
+    assert only(found).name == "joint_sign"
+    assert set(only(found).parameters) == {f"joint_{joint + 1}" for joint in turned}
+    np.testing.assert_allclose(found.views.joints_rad, CLEAN.joints_rad)
+
+
+@pytest.mark.parametrize(("wrote", "took"), [("ZYX", "xyz"), ("XYZ", "xyz")])
+def test_angles_written_in_another_order_than_they_were_read_are_told(wrote, took):
+    true = Rotation.from_matrix(CLEAN.base_from_flange[:, :3, :3])
+    poses = CLEAN.base_from_flange.copy()
+    poses[:, :3, :3] = Rotation.from_euler(took, true.as_euler(wrote)).as_matrix()
+    found = log_repair_of(replace(CLEAN, base_from_flange=poses))
+    assert only(found).name == "rotation_convention"
+    np.testing.assert_allclose(found.views.base_from_flange, CLEAN.base_from_flange, atol=1e-9)
+
+
+def test_poses_of_which_nobody_knows_who_carries_the_camera_leave_both_readings():
+    found = log_repair_of(replace(CLEAN, base_from_flange=rigid.inverse(CLEAN.base_from_flange)))
+    assert only(found).alike == ("mount",)
+
+
+def test_a_single_position_in_another_unit_is_told():
+    poses = CLEAN.base_from_flange.copy()
+    poses[[5, 6, 14], :3, 3] *= 1e3
+    found = log_repair_of(replace(CLEAN, base_from_flange=poses))
+    assert only(found).name == "length_unit"
+    assert f"frame {CLEAN.frame[14]} is in millimetres" in only(found).physics
+    np.testing.assert_allclose(found.views.base_from_flange, CLEAN.base_from_flange, atol=1e-12)
+
+
+def test_mirrored_pictures_are_told_and_set_right():
+    corners = CLEAN.corners_px.copy()
+    corners[..., 0] = CLEAN.width_px - 1.0 - corners[..., 0]
+    found = log_repair_of(replace(CLEAN, corners_px=corners))
+    assert only(found).name == "mirrored_pictures"
+    np.testing.assert_allclose(found.views.corners_px, CLEAN.corners_px, atol=1e-9)
+
+
+def test_frames_numbered_from_another_end_of_the_board_are_told_and_renumbered():
+    corners = CLEAN.corners_px.reshape(len(CLEAN), BOARD.rows, BOARD.cols, 2).copy()
+    corners[4], corners[9] = corners[4, ::-1, ::-1], corners[9, :, ::-1]
+    found = log_repair_of(replace(CLEAN, corners_px=corners.reshape(CLEAN.corners_px.shape)))
+    assert only(found).name == "corner_order"
+    assert f"frame {CLEAN.frame[9]}: columns run backwards" in only(found).physics
+    np.testing.assert_allclose(found.views.corners_px, CLEAN.corners_px)

@@ -11,19 +11,14 @@ from scipy.spatial.transform import Rotation
 from calib.chain import rigid
 from calib.discovery.log_consistency.consistency import Closure, close_loop
 from calib.discovery.log_consistency.mixup import Mixup
+from calib.discovery.log_consistency.rotation_readings import readings
+from calib.discovery.log_consistency.single_units import UNITS
 from calib.views import FloatArray, Views
 
 _BETTER = 0.2
 """Another convention must close the loop this much better than the logged one."""
 
 _ANGLE_SUSPECT_RAD = 0.02
-_UNITS = {
-    "millimetre": 1e-3,
-    "centimetre": 1e-2,
-    "inch": 0.0254,
-    "micrometre": 1e-6,
-    "foot": 0.3048,
-}
 _UNIT_TOLERANCE = 0.05
 
 
@@ -59,15 +54,16 @@ def _transposed(pose: FloatArray) -> FloatArray:
 class _Convention:
     words: str
     read: Callable[[FloatArray], FloatArray]
+    inverts: bool = False
 
 
 _AS_LOGGED = _Convention("base_from_flange, quaternion x y z w", lambda pose: pose)
 _OTHERS = (
     _Convention("its quaternion stands as w x y z", _scalar_first),
     _Convention("its quaternion stands as y z w x", _scalar_last_read_first),
-    _Convention("it is flange_from_base, the inverse", rigid.inverse),
+    _Convention("it is flange_from_base, the inverse", rigid.inverse, True),
     _Convention("its rotation is transposed", _transposed),
-    _Convention("w x y z, and the inverse", lambda p: rigid.inverse(_scalar_first(p))),
+    _Convention("w x y z, and the inverse", lambda p: rigid.inverse(_scalar_first(p)), True),
     _Convention("w x y z, and transposed", lambda p: _transposed(_scalar_first(p))),
 )
 
@@ -93,7 +89,8 @@ def find_conventions(views: Views, loop: FloatArray) -> ConventionsFound:
         return ConventionsFound((), None)
     chosen, closure = _AS_LOGGED, logged
     if logged.typical_angle_rad > _ANGLE_SUSPECT_RAD:
-        for convention in _OTHERS:
+        angles = (_Convention(words, read) for words, read in readings())
+        for convention in (*_OTHERS, *angles):
             read = convention.read(views.base_from_flange)
             tried = close_loop(loop, read, free_length=True)
             if tried is None or tried.length_factor <= 0.0:
@@ -115,10 +112,10 @@ def find_conventions(views: Views, loop: FloatArray) -> ConventionsFound:
 
 
 def _unit_of(factor: float) -> str | None:
-    for name, size in _UNITS.items():
+    for name, size in UNITS.items():
         if abs(factor / size - 1.0) < _UNIT_TOLERANCE:
             return name
-    for name, size in _UNITS.items():
+    for name, size in UNITS.items():
         if abs(factor * size - 1.0) < _UNIT_TOLERANCE:
             return f"1/{name}"
     return None
@@ -134,19 +131,24 @@ def _rotation_mixup(convention: _Convention, before: Closure, after: Closure) ->
         remedy="Correct the program that writes the log; the twin reads it as it should be.",
         mend=mend,
         evidence=(_miss(before), _miss(after)),
+        alike=("mount",) if convention.inverts else (),
+        apart=(
+            "a look at the cell: whether the camera or the board rides on the flange, as the"
+            " recording's key `mount` says"
+        ),
     )
 
 
 def _unit_mixup(unit: str, closure: Closure) -> Mixup:
     name = unit.removeprefix("1/")
-    size = _UNITS[name] if unit == name else 1.0 / _UNITS[name]
+    size = UNITS[name] if unit == name else 1.0 / UNITS[name]
 
     def mend(views: Views, neighbours: Views) -> Views:
         pose = views.base_from_flange.copy()
         pose[:, :3, 3] *= size
         return replace(views, base_from_flange=pose)
 
-    words = f"in {name}s" if unit == name else f"{1.0 / _UNITS[name]:g} times too small"
+    words = f"in {name}s" if unit == name else f"{1.0 / UNITS[name]:g} times too small"
     return Mixup(
         name="length_unit",
         physics=f"The log says metres, but its positions are {words}.",

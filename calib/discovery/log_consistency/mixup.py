@@ -25,6 +25,10 @@ class Mixup:
         Name to (value, unit).
     evidence:
         Miss of the loop before and after, as (radians, metres) pairs.
+    alike:
+        Names of physics, or keys of the recording, that would look the same.
+    apart:
+        What would tell them apart.
     """
 
     name: str
@@ -33,6 +37,8 @@ class Mixup:
     mend: Callable[[Views, Views], Views]
     parameters: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     evidence: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0))
+    alike: tuple[str, ...] = ()
+    apart: str = ""
 
 
 ROBOT_COLUMNS = (

@@ -7,17 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.chain import rigid
-from calib.discovery.log_consistency.consistency import Closure
 from calib.discovery.log_consistency.mispairing import mispaired
 from calib.discovery.log_consistency.mixup import Mixup
-from calib.discovery.log_consistency.trusted import Trusted, trusted_loop
-from calib.views import BoolArray, FloatArray, Views
+from calib.discovery.log_consistency.odd_frames import OddFrames
+from calib.views import FloatArray, Views
 
-_FAR = 12.0
-"""A frame this many times farther off than the median frame carries a wrong pose."""
-
-_MATCH = 5.0
 _MOST_ODD_SHARE = 0.1
 
 _SURE = 4.0
@@ -43,7 +37,7 @@ class Pairing:
     dropped: tuple[int, ...]
 
 
-def find_pairing(views: Views, log: Views, loop: FloatArray) -> Pairing:
+def find_pairing(views: Views, log: Views, loop: FloatArray, found: OddFrames | None) -> Pairing:
     """Name the pictures that are of another frame's pose, and those that are of nobody's.
 
     Parameters
@@ -52,14 +46,13 @@ def find_pairing(views: Views, log: Views, loop: FloatArray) -> Pairing:
         The frames, and every row of the log that is known (held-out frames too).
     loop:
         (N, 4, 4) mounted_from_fixed of the free poses.
+    found:
+        The frames that do not fit their own row.
     """
-    trusted = trusted_loop(views, log, loop)
-    if trusted is None:
+    if found is None or not found.odd.any():
         return Pairing((), ())
-    odd = _odd(trusted)
-    if not odd.any():
-        return Pairing((), ())
-    source = _sources(views, log, loop, trusted.closure, odd)
+    odd = found.odd
+    source = _sources(views, log, loop, found)
     lost = [int(i) for i in np.flatnonzero(odd & (source < 0))]
     alone = [i for i in lost if not _beside(lost, i)]
     few = len(alone) <= max(1, _MOST_ODD_SHARE * len(views))
@@ -67,7 +60,7 @@ def find_pairing(views: Views, log: Views, loop: FloatArray) -> Pairing:
     told = {
         int(views.frame[i]): int(log.frame[source[i]]) for i in np.flatnonzero(odd & (source >= 0))
     }
-    miss = (trusted.closure.typical_angle_rad, trusted.closure.typical_distance_m)
+    miss = (found.closure.typical_angle_rad, found.closure.typical_distance_m)
     paired = views.take(np.flatnonzero(~odd | (source >= 0)))
     return Pairing(mispaired(paired, told, miss), dropped)
 
@@ -77,22 +70,12 @@ def _beside(lost: list[int], i: int) -> bool:
     return i - 1 in lost or i + 1 in lost
 
 
-def _odd(trusted: Trusted) -> BoolArray:
-    angle, distance = trusted.as_logged.angle_rad, trusted.as_logged.distance_m
-    far = (angle > _FAR * trusted.closure.typical_angle_rad) | (
-        distance > _FAR * trusted.closure.typical_distance_m
-    )
-    return np.asarray(far & np.isfinite(angle))
-
-
-def _sources(
-    views: Views, log: Views, loop: FloatArray, closure: Closure, odd: BoolArray
-) -> NDArray[np.int64]:
+def _sources(views: Views, log: Views, loop: FloatArray, found: OddFrames) -> NDArray[np.int64]:
     """(N,) the row of the log whose pose each odd picture is of; -1 where there is none."""
     own = {int(frame): k for k, frame in enumerate(log.frame)}
-    expected = closure.expected(loop)
-    rows = np.flatnonzero(odd)
-    miss = {int(i): _miss(expected[i], log.base_from_flange, closure) for i in rows}
+    expected = found.closure.expected(loop)
+    rows = np.flatnonzero(found.odd)
+    miss = {int(i): found.miss(expected[i], log.base_from_flange) for i in rows}
     best = {i: int(each.argmin()) for i, each in miss.items()}
     by_row = {own[int(views.frame[i])]: i for i in best}
     source = np.full(len(views), -1)
@@ -114,11 +97,3 @@ def _nearest(miss: FloatArray, own: int, best: int) -> int:
     """Of the rows that fit as well as the best, the one nearest in the log."""
     alike = np.flatnonzero(miss <= max(1.0, miss[best]))
     return int(alike[np.abs(alike - own).argmin()])
-
-
-def _miss(expected: FloatArray, poses: FloatArray, closure: Closure) -> FloatArray:
-    """(K,) how far each pose lies from the expected one, in units of what is tolerated."""
-    step = np.nan_to_num(rigid.to_vector(rigid.inverse(expected) @ poses), nan=1e9)
-    angle = np.linalg.norm(step[:, 3:], axis=1) / (_MATCH * closure.typical_angle_rad + 1e-4)
-    lever = _MATCH * closure.typical_distance_m + 1e-4
-    return np.asarray(np.maximum(angle, np.linalg.norm(step[:, :3], axis=1) / lever))

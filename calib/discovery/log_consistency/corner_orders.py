@@ -1,0 +1,103 @@
+"""Single frames whose corners are numbered from another end of the board, or across it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.discovery.log_consistency.mixup import Mixup
+from calib.discovery.log_consistency.odd_frames import OddFrames
+from calib.views import Board, FloatArray, Views
+
+
+@dataclass(frozen=True)
+class CornerOrder:
+    """A numbering of the same corners.
+
+    Attributes
+    ----------
+    words:
+        What was done to rows and columns.
+    place:
+        (M,) number that corner k truly has.
+    true_from_named:
+        (4, 4) where a corner of a flat board truly is, from where its number says.
+    """
+
+    words: str
+    place: NDArray[np.int64]
+    true_from_named: FloatArray
+
+
+def corner_orders(board: Board) -> list[CornerOrder]:
+    """Every other numbering of the board's grid by rows and columns."""
+    grid = np.arange(board.corner_count).reshape(board.rows, board.cols)
+    orders = {
+        "rows and columns run backwards": grid[::-1, ::-1],
+        "rows run backwards": grid[::-1],
+        "columns run backwards": grid[:, ::-1],
+    }
+    if board.rows == board.cols:
+        orders["rows and columns are exchanged"] = grid.T
+        orders["the board is turned by a quarter"] = np.rot90(grid)
+        orders["the board is turned by three quarters"] = np.rot90(grid, 3)
+        orders["rows and columns are exchanged and run backwards"] = grid[::-1, ::-1].T
+    return [
+        CornerOrder(words, np.asarray(order).ravel(), _rigid(board, np.asarray(order).ravel()))
+        for words, order in orders.items()
+    ]
+
+
+def _rigid(board: Board, place: NDArray[np.int64]) -> FloatArray:
+    """A mirrored grid is the flat board turned over, which is rigid."""
+    points = board.corners_m
+    turn = np.linalg.lstsq(points[:, :2] - points[0, :2], points[place] - points[place[0]],
+                           rcond=None)[0].T  # fmt: skip
+    out = np.eye(4)
+    out[:3, :2] = turn
+    out[:3, 2] = np.cross(turn[:, 0], turn[:, 1])
+    out[:3, 3] = points[place[0]] - out[:3, :3] @ points[0]
+    return out
+
+
+def find_corner_orders(views: Views, odd: OddFrames, camera_from_board: FloatArray) -> Mixup | None:
+    """Name the odd frames that fit their own pose once their corners are numbered otherwise.
+
+    Parameters
+    ----------
+    views, odd:
+        The frames, and which do not fit their pose.
+    camera_from_board:
+        (N, 4, 4) free poses.
+    """
+    found: dict[int, CornerOrder] = {}
+    for order in corner_orders(views.board):
+        renamed = camera_from_board @ np.linalg.inv(order.true_from_named)
+        for i in odd.fitting(views, renamed):
+            found.setdefault(int(views.frame[i]), order)
+    if not found:
+        return None
+    told = ", ".join(f"frame {frame}: {order.words}" for frame, order in sorted(found.items()))
+    return Mixup(
+        name="corner_order",
+        physics=f"Corners are numbered otherwise than in the other frames: {told}.",
+        remedy="Number the corners from the same end of the board in every frame.",
+        mend=_renumbering(found),
+        parameters={"frames": (float(len(found)), "frame")},
+    )
+
+
+def _renumbering(found: Mapping[int, CornerOrder]) -> Callable[[Views, Views], Views]:
+    def mend(some: Views, neighbours: Views) -> Views:
+        corners, sigma = some.corners_px.copy(), some.corner_sigma_px.copy()
+        for i, frame in enumerate(some.frame):
+            order = found.get(int(frame))
+            if order is not None:
+                corners[i, order.place] = some.corners_px[i]
+                sigma[i, order.place] = some.corner_sigma_px[i]
+        return replace(some, corners_px=corners, corner_sigma_px=sigma)
+
+    return mend
