@@ -106,12 +106,16 @@ def _named(unknown: Unknown, views: Views) -> str:
     return f"{frames[frame]}.{axis}" if frame in frames else plain.get(frame, frame)
 
 
+_ROUNDING = 1e-14
+"""Where nothing at all is known of a number, rounding may leave its variance below zero."""
+
+
 def _best(added: dict[str, FloatArray], scaled: FloatArray, u: FloatArray) -> tuple[str, float]:
     """The views that lower the uncertainty along `u` most, and by what factor."""
 
     def sigma(information: FloatArray) -> float:
         held = information + 1e-14 * np.eye(len(u))
-        return float(np.sqrt(u @ np.linalg.solve(held, u)))
+        return float(np.sqrt(max(float(u @ np.linalg.solve(held, u)), _ROUNDING)))
 
     gains = {words: sigma(scaled) / sigma(scaled + more) for words, more in added.items()}
     words = max(gains, key=lambda w: gains[w])

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from calib.chain.effect import Effect
 from calib.discovery.diagnosis import Ambiguity
+from calib.discovery.log_consistency.mixup import Mixup
 from calib.discovery.search import UNDECIDED, Search
 
 _EXPERIMENTS = {
@@ -56,6 +59,19 @@ _GENERAL = "more views in which the two differ: the plan of `separate_with`, if 
 def experiment(first: Effect, second: Effect) -> str:
     """What would tell the two apart, in words."""
     return _EXPERIMENTS.get(frozenset({first.name, second.name}), _GENERAL)
+
+
+def ambiguous_mixups(mixups: Sequence[Mixup]) -> tuple[Ambiguity, ...]:
+    """For every mix-up in the log, what would look the same in pictures and poses."""
+    return tuple(
+        Ambiguity(
+            names=(mixup.name, other),
+            why=f"pictures and poses are the same for {other}: the log alone cannot decide",
+            experiment=mixup.apart,
+        )
+        for mixup in mixups
+        for other in mixup.alike
+    )
 
 
 def ambiguities(search: Search) -> tuple[Ambiguity, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from calib.chain.effect import Present
 from calib.chain.empirical import UNNAMED
 from calib.chain.model import kinematics_of, walk
-from calib.discovery.ambiguity import ambiguities
+from calib.discovery.ambiguity import ambiguities, ambiguous_mixups
 from calib.discovery.candidates import unseen
 from calib.discovery.diagnosis import (
     Diagnosis,
@@ -28,6 +28,7 @@ from calib.discovery.log_consistency.mixup import Mixup
 from calib.discovery.log_repair import LogRepair, repair_log
 from calib.discovery.pictures import fit_blur, told_of
 from calib.discovery.prove import held_out, prediction_rms_px, prove
+from calib.discovery.rejections import LostFrames, lost_frames
 from calib.discovery.residual_structure import ResidualStructure, find_residual_structure
 from calib.discovery.scatter import scattered
 from calib.discovery.search import Search
@@ -74,7 +75,16 @@ def diagnose(
     else:
         search.force(forced)
         structure = ResidualStructure(search, ())
-    return _diagnosis(repaired, held, before, structure)
+    found = _diagnosis(repaired, held, before, structure)
+    return _with_lost_frames(found, lost_frames(repaired.rejected, views.frame))
+
+
+def _with_lost_frames(found: Diagnosis, lost: LostFrames | None) -> Diagnosis:
+    """Let frames that contradict the others be the first thing that is unexplained."""
+    if lost is None:
+        return found
+    frames = Unexplained("bookkeeping", "frames", "order", lost.where, lost.p_value, None)
+    return replace(found, verdict="unexplained", unexplained_all=(frames, *found.unexplained_all))
 
 
 def _searched(search: Search, before: JointFit) -> ResidualStructure:
@@ -135,7 +145,7 @@ def _diagnosis(
     return Diagnosis(
         verdict=_verdict(named, structure),
         effects=named,
-        ambiguous_with=ambiguities(search),
+        ambiguous_with=(*ambiguous_mixups(repaired.mixups), *ambiguities(search)),
         unexplained_all=_unexplained(structure, fits, held_views, search.fitter),
         mismatch=_mismatches(fits, everything),
         split=(split_misfit(plain, judge), split_misfit(twin, judge)),

@@ -48,9 +48,23 @@ class Calibrated:
 
 
 def calibrate_recording(
-    recording: Recording, corners: Corners | None = None, progress: Progress | None = None
+    recording: Recording,
+    corners: Corners | None = None,
+    progress: Progress | None = None,
+    *,
+    mended: Views | None = None,
 ) -> Calibrated:
     """Calibrate a recording in every way it allows.
+
+    Parameters
+    ----------
+    recording, corners:
+        What was recorded, and the corners in its pictures where they are known already.
+    progress:
+        Told after every picture searched.
+    mended:
+        The recording's frames with the log put right, to be calibrated in place of the log as
+        it stands.
 
     Raises
     ------
@@ -60,7 +74,7 @@ def calibrate_recording(
         The recording's files are broken.
     """
     corners = corners_of(recording, progress) if corners is None else corners
-    views = same_order_everywhere(recording.views(corners))
+    views = same_order_everywhere(recording.views(corners)) if mended is None else mended
     try:
         result = calibrate(views)
     except CalibrationError as error:

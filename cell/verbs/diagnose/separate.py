@@ -155,7 +155,10 @@ class _Around:
         """Design for one pair."""
         if len(self.stops) < 2 * POSES:
             return Separation(None, "", "too few other views can be reached from where it was")
-        first = next(p for p in self.found.twin.model.effects if p.effect.name == pair.names[0])
+        effects = self.found.twin.model.effects
+        first = next((p for p in effects if p.effect.name == pair.names[0]), None)
+        if first is None:
+            return Separation(None, "", f"no plan of poses can: {pair.experiment}")
         design = self._design(first, _rival(pair.names[1], self.found.views))
         rounds = _rounds(design)
         worth = (

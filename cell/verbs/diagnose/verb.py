@@ -142,7 +142,9 @@ def _report(
     truth: CellModel | None,
 ) -> None:
     if calibrated is None:
-        calibrated = calibrate_recording(recording, corners)
+        mixed_up = any(effect.link == "bookkeeping" for effect in found.effects)
+        mended = found.views if mixed_up else None
+        calibrated = calibrate_recording(recording, corners, mended=mended)
     data = report_data(recording, calibrated, simulated=simulated)
     noise = found.twin.noise
     evidence = diagnosis_evidence(

@@ -129,7 +129,8 @@ register(
 )
 register(
     "mount_slip board_slip optics_step frame_pose_offset frame_pose_swap stale_pictures "
-    "length_unit rotation_convention bookkeeping",
+    "stale_poses tool_frame_step base_frame_step corner_order length_unit rotation_convention "
+    "bookkeeping",
     Picture(
         order.by_frame,
         "Which frames are off: a step is a slip, single peaks are frames paired with a wrong pose.",
