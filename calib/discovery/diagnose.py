@@ -68,10 +68,11 @@ def diagnose(
     repaired, branch_price = _with_branches(repaired)
     held = held_out(len(repaired.views))
     fitter = Fitter(repaired.views.take(~held), repaired.has_robot)
-    before = fit_start(fitter, repaired.free, ~held)
-    search = Search(before, fitter, branch_price)
+    start = fit_start(fitter, repaired.free, ~held, repaired.known)
+    before = fitter.with_effects(start, ()) if repaired.known else start
+    search = Search(start, fitter, branch_price)
     if forced is None:
-        structure = _searched(search, before)
+        structure = _searched(search, start)
     else:
         search.force(forced)
         structure = ResidualStructure(search, ())
@@ -108,7 +109,9 @@ def _with_branches(repaired: LogRepair) -> tuple[LogRepair, float]:
     if repaired.joints_logged or not repaired.has_robot or kinematics is None:
         return repaired, 0.0
     every = np.ones(len(views), dtype=bool)
-    chosen = choose_branches(fit_start(Fitter(views), repaired.free, every), views, kinematics)
+    chosen = choose_branches(
+        fit_start(Fitter(views), repaired.free, every, repaired.known), views, kinematics
+    )
     mended = replace(
         repaired,
         views=with_branches(views, chosen, views.frame),

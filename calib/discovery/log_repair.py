@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.calibration.baseline import fit_baseline
+from calib.calibration.baseline import Baseline, fit_baseline
 from calib.calibration.frames import usable_frames
 from calib.calibration.result import Rejection
 from calib.chain import rigid
+from calib.chain.effect import Present
 from calib.discovery.log_consistency.consistency import mounted_from_fixed
 from calib.discovery.log_consistency.conventions import find_conventions
 from calib.discovery.log_consistency.corner_orders import find_corner_orders
@@ -21,6 +22,7 @@ from calib.discovery.log_consistency.mirror import find_mirror
 from calib.discovery.log_consistency.mixup import ROBOT_COLUMNS, Mixup
 from calib.discovery.log_consistency.odd_frames import find_odd_frames
 from calib.discovery.log_consistency.pairing import find_pairing
+from calib.discovery.log_consistency.picture_step import as_before, find_picture_step
 from calib.discovery.log_consistency.recover import recover_joints, recover_poses
 from calib.discovery.log_consistency.robot_model import find_robot_model
 from calib.discovery.log_consistency.single_units import find_single_units
@@ -54,6 +56,8 @@ class LogRepair:
         False where there are no poses to hold the pictures against.
     joints_logged:
         False where the joints were worked out from the poses, by a first choice of branches.
+    known:
+        Effects that the pictures alone have shown: a change of their scale or region midway.
     """
 
     views: Views
@@ -64,6 +68,7 @@ class LogRepair:
     said: tuple[str, ...]
     has_robot: bool
     joints_logged: bool
+    known: tuple[Present, ...]
 
 
 def repair_log(views: Views, log: Views) -> LogRepair:
@@ -91,6 +96,7 @@ class _Log:
         self.views, self.log = views, log
         self.mixups: list[Mixup] = []
         self.said: list[str] = []
+        self.known: tuple[Present, ...] = ()
 
     def mend(self, mixup: Mixup | None) -> bool:
         """Mend what was found; False where nothing was."""
@@ -121,7 +127,7 @@ class _Log:
 
 def _repaired(repair: _Log, *, renumbered: bool) -> LogRepair:
     """Mend the log; once more from the pictures on where their corners were renumbered."""
-    baseline = fit_baseline(repair.views, usable_frames(repair.views))
+    baseline = _calibrated(repair)
     free = free_views(baseline, repair.views.height_px)
     loop = mounted_from_fixed(free.camera_from_board, repair.views.mount)
     good = np.asarray(np.isfinite(free.camera_from_board).all(axis=(1, 2)))
@@ -157,6 +163,17 @@ def _repaired(repair: _Log, *, renumbered: bool) -> LogRepair:
             f" a diagnosis needs {FEWEST_FRAMES}"
         )
     return _log_repair(repair, free, rejected, True, kept, joints_logged)
+
+
+def _calibrated(repair: _Log) -> Baseline:
+    """The pictures' calibration, as if a change of the camera midway had not been."""
+    baseline = fit_baseline(repair.views, usable_frames(repair.views))
+    changed = find_picture_step(repair.views, baseline)
+    if changed is None:
+        return baseline
+    repair.known = (changed.step,)
+    alike = as_before(repair.views, changed)
+    return fit_baseline(alike, usable_frames(alike))
 
 
 def _without_pose(views: Views, dropped: Sequence[int]) -> list[Rejection]:
@@ -210,4 +227,5 @@ def _log_repair(
         tuple(repair.said),
         has_robot,
         joints_logged,
+        repair.known,
     )

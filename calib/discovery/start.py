@@ -128,7 +128,9 @@ _MOST_FREE_CORNERS = 150
 _PRINT_GUESS_M = 2e-5
 
 
-def fit_start(fitter: Fitter, free: FreeViews, train: BoolArray) -> JointFit:
+def fit_start(
+    fitter: Fitter, free: FreeViews, train: BoolArray, known: Sequence[Present] = ()
+) -> JointFit:
     """Fit the plain cell, with printed corners free where the data ask for it.
 
     Parameters
@@ -139,6 +141,8 @@ def fit_start(fitter: Fitter, free: FreeViews, train: BoolArray) -> JointFit:
         What the pictures say, of all frames.
     train:
         (N,) which of all frames are the fitter's.
+    known:
+        Effects that the pictures alone have shown.
     """
     views = fitter.views
     poses = free.camera_from_board[train]
@@ -148,7 +152,7 @@ def fit_start(fitter: Fitter, free: FreeViews, train: BoolArray) -> JointFit:
     else:
         model = CellModel(free.optics, np.eye(4), np.eye(4))
         noise = Noise(max(free.sigma_px, 1e-3), *UNKNOWN_POSE)
-    fit = fitter.fit(model, noise)
+    fit = fitter.fit(model.with_effects(known), noise)
     if not fitter.has_robot or views.board.corner_count > _MOST_FREE_CORNERS:
         return fit
     guess = replace(fit.noise, print_m=_PRINT_GUESS_M)
