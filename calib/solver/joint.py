@@ -262,10 +262,20 @@ class _Iteration:
             cost += float(np.sum(_shift_of(at.model, self.views) ** 2)) / at.noise.print_m**2
         return cost
 
+    def _cost_here(self) -> float:
+        """The same at the present state, whose residuals the equations have already."""
+        found, noise = self.equations, self.state.noise
+        cost = found.frames.square_sum / noise.corner_px**2
+        cost += float(np.sum(found.own_error @ noise.own_information * found.own_error))
+        cost += float(np.sum(found.amount**2 * found.amount_information))
+        if self.with_print:
+            cost += float(np.sum(found.corner_shift**2)) / noise.print_m**2
+        return cost
+
     def step(self) -> bool:
         """Take one step that lowers the cost; True when nothing is left to gain."""
         noise = self.state.noise
-        before = self.cost(self.state)
+        before = self._cost_here()
         while self.damping < 1e8:
             trial = self._trial(noise)
             after = self.cost(trial)
@@ -303,9 +313,11 @@ class _Iteration:
             self.state = replace(self.state, noise=level)
         if self.robust:
             weight = _robust_weight(self.residual, self.state.noise.corner_px)
-            changed = changed or bool(np.abs(weight - self.weight).max() > SETTLED)
-            self.weight = weight
-            self.equations, self.residual = self._assemble(self.found, self.state)
+            moved_by = float(np.abs(weight - self.weight).max())
+            changed = changed or moved_by > SETTLED
+            if moved_by > 0.0:
+                self.weight = weight
+                self.equations, self.residual = self._assemble(self.found, self.state)
         self.damping = _FIRST_DAMPING  # a search that has settled ends with a high one
         return changed
 

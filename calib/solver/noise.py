@@ -146,6 +146,13 @@ def scaled(
 
 def profile(equations: JointEquations, noise: Noise, *, restricted: bool = True) -> Profile:
     """Solve the joint problem at these noise levels and say how likely the data then are."""
+    return _profile(equations, noise, restricted)[0]
+
+
+def _profile(
+    equations: JointEquations, noise: Noise, restricted: bool
+) -> tuple[Profile, FloatArray]:
+    """The profile; and the covariance of those last shared numbers that are integrated out."""
     reduced, _ = scaled(equations, noise)
     step, covariance, log_det = solve_scaled(reduced.shared, reduced.shared_residual)
     square_sum = reduced.square_sum - float(step @ reduced.shared_residual)
@@ -156,14 +163,58 @@ def profile(equations: JointEquations, noise: Noise, *, restricted: bool = True)
         + reduced.log_det_own
         + square_sum
     )
+    integrated = covariance if restricted else np.zeros((0, 0))
     if c:
         minus_two_log += c * 2.0 * np.log(noise.print_m)
     if restricted:
         minus_two_log += log_det
     elif c:
         block = reduced.shared[-c:, -c:]
-        minus_two_log += solve_scaled(block, np.zeros(c))[2]
-    return Profile(step, covariance, reduced, float(minus_two_log), square_sum)
+        _, integrated, log_det = solve_scaled(block, np.zeros(c))
+        minus_two_log += log_det
+    return Profile(step, covariance, reduced, float(minus_two_log), square_sum), integrated
+
+
+def _slope(
+    equations: JointEquations, noise: Noise, found: Profile, integrated: FloatArray
+) -> dict[str, float]:
+    """Derivatives of -2 log likelihood by the logarithm of each level.
+
+    By the square sum at its minimum only the levels themselves count (the envelope theorem); by
+    the log-determinants the posterior variances of all that is integrated out do: what data and
+    prior leave of a level's own prior variance.
+    """
+    reduced, c = found.reduced, equations.corner_numbers
+    first = len(found.step) - len(integrated)
+    back = reduced.back[:, :, first:]
+    own = equations.own_error + reduced.at_zero - reduced.back @ found.step
+    variance = np.einsum("nii->ni", reduced.own_covariance)
+    variance = variance + np.sum((back @ integrated) * back, axis=2)
+    information = np.diag(noise.own_information)
+    # of each prior: how many numbers, less what is left of their variance, less their squares
+    kept = information * variance.sum(axis=0)
+    square = information * np.sum(own**2, axis=0)
+    shared = np.concatenate([equations.amount, equations.corner_shift]) + found.step
+    prior = np.concatenate(
+        [equations.amount_information, np.full(c, noise.print_m**-2.0 if c else 0.0)]
+    )
+    shared_kept = prior[first:] * np.diag(integrated)
+    shared_square = prior * shared**2
+    n = len(own)
+    rank = float(np.sum(integrated * reduced.shared[first:, first:]))
+    freedom = n * own.shape[1] + rank - kept.sum() - shared_kept.sum()
+    data = found.square_sum - square.sum() - shared_square.sum()
+    by_prior = n - kept - square
+    slope = {
+        "corner_px": equations.observations - freedom - data,
+        "flange_m": by_prior[:3].sum(),
+        "flange_rad": by_prior[3:6].sum(),
+        "focal": by_prior[6:].sum(),
+        "print_m": c
+        - shared_kept[len(shared_kept) - c :].sum()
+        - shared_square[len(prior) - c :].sum(),
+    }
+    return {name: 2.0 * float(value) for name, value in slope.items()}
 
 
 def _levels(noise: Noise, estimated: tuple[str, ...]) -> FloatArray:
@@ -185,14 +236,18 @@ def estimate_noise(
     def at(levels: FloatArray) -> Noise:
         return replace(guess, **dict(zip(estimated, np.exp(levels).tolist(), strict=True)))
 
-    def cost(levels: FloatArray) -> float:
-        return profile(equations, at(levels), restricted=restricted).minus_two_log
+    def cost(levels: FloatArray) -> tuple[float, FloatArray]:
+        noise = at(levels)
+        found, integrated = _profile(equations, noise, restricted)
+        slope = _slope(equations, noise, found, integrated)
+        return found.minus_two_log, np.array([slope[name] for name in estimated])
 
     found = minimize(
         cost,
         start,
+        jac=True,
         method="L-BFGS-B",
         bounds=list(zip(low, high, strict=True)),
-        options={"maxiter": 40, "ftol": 1e-9, "eps": 1e-4},
+        options={"maxiter": 40, "ftol": 1e-9},
     )
     return at(found.x), float(found.fun)
