@@ -36,6 +36,7 @@ def export(
 ) -> None:
     """Write the calibrated camera for ROS, OpenCV, mrcal, Kalibr, COLMAP or as JSON."""
     from cell.storage.files.calibration_place import calibration_file
+    from cell.storage.whole import write_whole
     from cell.verbs.export import export_calibration, read_calibration
 
     path = calibration_file(calibration)
@@ -53,7 +54,7 @@ def export(
     for warning in exported.warnings:
         say(f"warning: {warning}")
     if output is not None:
-        _write(output, exported.text)
+        write_whole(output, exported.text)
     if output is None and not as_json:
         sys.stdout.write(exported.text)
         return
@@ -67,10 +68,3 @@ def _size(words: str) -> tuple[int, int]:
     if found is None:
         raise InputError(f"--image-size {words}: must be WIDTHxHEIGHT, such as 4096x3072")
     return int(found[1]), int(found[2])
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be written: {fault.strerror}") from None

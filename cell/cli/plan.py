@@ -64,9 +64,10 @@ def _designed(cell: Path, path: Path, wish: Requirements) -> Plan:
     from cell.storage.files.plan_file import Plan
     from cell.verbs.plan import design_plan
 
-    beside = os.path.relpath(cell.resolve(), path.resolve().parent)
     read = read_cell(cell)
-    return Plan(path, design_plan(read, wish.size_for(read), beside), read)
+    held = cell.resolve().is_relative_to(path.resolve().parent)  # a plan names no file elsewhere
+    named = os.path.relpath(cell.resolve(), path.resolve().parent) if held else None
+    return Plan(path, design_plan(read, wish.size_for(read), named), read)
 
 
 def _written(cell: Path, path: Path, wish: Requirements) -> Plan:

@@ -15,7 +15,7 @@ from cell.sequencer.journal import Journal, check_same_plan, skipped_views
 from cell.sequencer.progress import Progress
 from cell.sequencer.requests import Requests
 from cell.sequencer.sequencer import Devices, Sequencer
-from cell.sequencer.states import RunResult
+from cell.sequencer.states import Finish, RunResult
 from cell.sequencer.stop import StopRequest, signals_ask
 from cell.sequencer.watcher import Watcher
 from cell.storage.files.plan_file import Plan
@@ -73,6 +73,8 @@ def record_plan(
         )
         try:
             result = sequencer.run()
+            if result.finish is not Finish.DEVICE_FAILED:
+                writer.check_whole()
             writer.say(ended_early=result.ended_early or None)
             return result
         finally:

@@ -12,9 +12,9 @@ from calib.calibration.mapping import as_mapping
 from calib.detection.same_order import same_order_everywhere
 from calib.errors import CalibrationError
 from calib.views import Views
-from cell.errors import BadAnswer, InputError
+from cell.errors import BadAnswer
 from cell.storage.files.calibration_file import CalibrationFile
-from cell.storage.files.results import results_folder
+from cell.storage.files.results import results_folder, write_results
 from cell.storage.recording import Corners, Recording, write_corners
 from cell.storage.recording.detect import Progress, corners_of
 from cell.views.report import (
@@ -159,16 +159,7 @@ def write_calibration(calibrated: Calibrated, folder: Path, corners: Corners | N
     InputError
         The folder cannot be written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / FILE_NAME
-        partial = path.with_name(path.name + ".part")
-        partial.write_text(json.dumps(calibrated.mapping, indent=1) + "\n", encoding="utf-8")
-        partial.replace(path)
-        if corners is not None:
-            write_corners(folder / "detections.csv", corners, calibrated.views.board)
-    except OSError as fault:
-        raise InputError(
-            f"{folder}: cannot be written: {fault.strerror}; give another -o"
-        ) from None
-    return path
+    write_results(folder, {FILE_NAME: json.dumps(calibrated.mapping, indent=1) + "\n"})
+    if corners is not None:
+        write_corners(folder / "detections.csv", corners, calibrated.views.board)
+    return folder / FILE_NAME

@@ -1,6 +1,10 @@
 from __future__ import annotations
 
 import logging
+import math
+import os
+import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cell.errors import EXIT_INPUT, InputError
+from cell.errors import EXIT_DEVICE, EXIT_INPUT, DiskFailed, InputError
 from cell.storage.recording import (
     Corners,
     FrameRecord,
@@ -17,7 +21,7 @@ from cell.storage.recording import (
     write_corners,
 )
 from cell.storage.recording.header import Header
-from tests.cell.recordings import HEADER, corner_rows, frame_line
+from tests.cell.recordings import HEADER, POSE, corner_rows, frame_line
 
 Folder = Callable[..., Path]
 
@@ -176,7 +180,7 @@ def test_written_frames_are_read_back(tmp_path: Path) -> None:
 def test_a_recording_is_never_overwritten(tmp_path: Path) -> None:
     with RecordingWriter.create(tmp_path / "r", header()) as writer:
         writer.append(FrameRecord(frame=0), np.zeros((4, 4), np.uint8))
-        with pytest.raises(FileExistsError):
+        with pytest.raises(DiskFailed, match=r"00000.png: is there already and is never overwr"):
             writer.append(FrameRecord(frame=0), np.zeros((4, 4), np.uint8))
     with pytest.raises(InputError, match="never overwritten"):
         RecordingWriter.create(tmp_path / "r", header())
@@ -197,3 +201,121 @@ def test_resume_cuts_the_half_line_and_sets_unlogged_pictures_aside(tmp_path: Pa
     assert [frame.frame for frame in recording.frames] == [0, 1]
     assert int(recording.image(recording.frames[1])[0, 0]) == 3
     assert (folder / "images" / "unlogged" / "00001-0.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("harm", "message"),
+    [
+        (lambda r: (r / "frames.jsonl").unlink(), r"frames.jsonl: was deleted"),
+        (lambda r: _replaced(r / "frames.jsonl"), r"frames.jsonl: was deleted, cut or repl"),
+        (lambda r: os.truncate(r / "frames.jsonl", 5), r"frames.jsonl: has 5 bytes"),
+        (lambda r: (r / "frames.jsonl").write_text("x" * 999), r"frames.jsonl: has 999 bytes"),
+        (lambda r: shutil.rmtree(r / "images"), r"images: was deleted"),
+        (lambda r: (r / "images").rename(r / "elsewhere"), r"images: was deleted"),
+        (lambda r: (r / "images" / "00001.png").unlink(), r"00001.png: was deleted"),
+        (lambda r: os.truncate(r / "images" / "00001.png", 9), r"00001.png: was deleted, cut"),
+    ],
+)
+def test_the_writer_notices_that_what_it_wrote_is_gone(
+    tmp_path: Path, harm: Callable[[Path], object], message: str
+) -> None:
+    with RecordingWriter.create(tmp_path / "r", header()) as writer:
+        for frame in (0, 1):
+            writer.append(FrameRecord(frame=frame), np.zeros((4, 4), np.uint8))
+        writer.check_whole()
+        harm(tmp_path / "r")
+        with pytest.raises(DiskFailed, match=message) as caught:
+            writer.append(FrameRecord(frame=2), np.zeros((4, 4), np.uint8))
+        assert caught.value.exit_status == EXIT_DEVICE
+        with pytest.raises(DiskFailed, match=message):
+            writer.check_whole()
+
+
+def _replaced(path: Path) -> None:
+    """By another file of the same content, as an editor does."""
+    other = path.with_name("other")
+    other.write_bytes(path.read_bytes())
+    other.replace(path)
+
+
+def test_an_older_picture_that_is_gone_is_noticed_at_the_end(tmp_path: Path) -> None:
+    with RecordingWriter.create(tmp_path / "r", header()) as writer:
+        for frame in range(3):
+            writer.append(FrameRecord(frame=frame), np.zeros((4, 4), np.uint8))
+        (tmp_path / "r" / "images" / "00000.png").unlink()
+        with pytest.raises(DiskFailed, match=r"00000.png: was deleted"):
+            writer.check_whole()
+
+
+@pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(b"")])
+def test_going_on_needs_the_pictures_of_its_lines(
+    tmp_path: Path, harm: Callable[[Path], object]
+) -> None:
+    with RecordingWriter.create(tmp_path / "r", header()) as writer:
+        for frame in range(4):
+            writer.append(FrameRecord(frame=frame), np.zeros((4, 4), np.uint8))
+    harm(tmp_path / "r" / "images" / "00002.png")
+    with pytest.raises(InputError, match=r"pictures of 1 frames are missing or empty \(frames 2\)"):
+        RecordingWriter.resume(tmp_path / "r")
+    shutil.rmtree(tmp_path / "r" / "images")
+    with pytest.raises(InputError, match=r"pictures of 4 frames are missing"):
+        RecordingWriter.resume(tmp_path / "r")
+
+
+BAD_FRAMES = {
+    "not finite": ({"t_s": math.nan}, r"t_s: must be a finite number"),
+    "infinite pose": (
+        {"base_from_flange": {**POSE, "p_m": [math.inf, 0, 0]}},
+        r"base_from_flange.p_m.0: must be a finite number",
+    ),
+    "no rotation": ({"base_from_flange": {**POSE, "q_xyzw": [0, 0, 0, 0]}}, "no unit quaternion"),
+    "millimetres": (
+        {"base_from_flange": {**POSE, "p_m": [500.0, 0.0, 400.0]}},
+        r"p_m is 640.3 m away .* others are 0.64 m away: is it in millimetres",
+    ),
+    "a word": ({"t_s": "noon"}, r"t_s: .*got 'noon'"),
+    "a joint too many": (
+        {"joints_rad": [0.1] * 7},
+        "has 7 joint values where the other frames have 6",
+    ),
+    "thousands of joints": ({"joints_rad": [0.1] * 5000}, "at most 32 items"),
+    "a lens focused on itself": ({"focus_distance_m": 0}, "focus_distance_m: .*greater than 0"),
+    "a number without end": ({"gain_db": 10**400}, "gain_db: is larger than 1e"),
+    "a NUL": ({"image": "a\0b"}, "image: holds a NUL"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_FRAMES)
+def test_one_bad_frame_is_one_rejected_frame(
+    recording_folder: Folder, caplog: pytest.LogCaptureFixture, kind: str
+) -> None:
+    values, message = BAD_FRAMES[kind]
+    lines = [frame_line(0), frame_line(1, **values), *map(frame_line, range(2, 6))]
+    rows = "".join(map(corner_rows, range(6)))
+    with caplog.at_level(logging.WARNING):
+        recording = read_recording(
+            recording_folder(frames="".join(lines), detections=f"frame,row,col,u_px,v_px\n{rows}")
+        )
+    assert list(recording.rejected) == [1]
+    assert re.search(rf"frames.jsonl:2: frame 1: .*{message}", recording.rejected[1])
+    assert re.search(message, caplog.text)
+    views = recording.views()
+    assert views.seen.all(axis=1).tolist() == [True, False, True, True, True, True]
+    assert views.has_pose.tolist() == [True, False, True, True, True, True]
+    assert recording.detections().rejected == recording.rejected
+
+
+def test_a_whole_log_in_millimetres_is_read_as_it_is(recording_folder: Folder) -> None:
+    pose = {**POSE, "p_m": [500.0, 0.0, 400.0]}
+    lines = [frame_line(frame, base_from_flange=pose) for frame in range(3)]
+    recording = read_recording(recording_folder(frames="".join(lines)))
+    assert not recording.rejected
+    assert recording.views().has_pose.all()
+
+
+@pytest.mark.parametrize("u_px", ["nan", "inf", "-1e300"])
+def test_a_corner_that_is_nowhere_is_not_found(recording_folder: Folder, u_px: str) -> None:
+    rows = corner_rows(0).replace("0,0,1,15,8", f"0,0,1,{u_px},8") + corner_rows(1)
+    views = read_recording(recording_folder(detections=f"frame,row,col,u_px,v_px\n{rows}")).views()
+    assert views.seen[0].tolist() == [True, False, True, True, True, True]
+    assert np.isnan(views.corners_px[0, 1]).all()

@@ -15,6 +15,7 @@ from cell.errors import InputError
 from cell.storage.files.cell_file import CellFile, read_cell
 from cell.storage.files.parts import Finite, Joints, Part, Pose, Positive
 from cell.storage.files.yaml_model import check_schema, parse_model, position_of, read_mapping
+from cell.storage.incoming import inside, plain_file
 from drivers.errors import SafetyError
 
 SCHEMA: Final = "cell.plan/1"
@@ -137,7 +138,7 @@ class PlanFile(Part):
     schema_: Literal["cell.plan/1"] = Field(default=SCHEMA, alias="schema")
     name: str
     cell: CellOrPath
-    """Path of a cell file, relative to the plan, or the cell itself."""
+    """Path of a cell file in the plan's folder or below, or the cell itself."""
     speed_m_s: Positive = 0.1
     """Greatest speed of the flange; above 0.25 only with `fenced: true`."""
     joint_speed_deg_s: Positive = 30.0
@@ -229,8 +230,8 @@ def read_plan(path: Path) -> Plan:
 def _cell_of(path: Path, file: PlanFile) -> CellFile:
     if isinstance(file.cell, CellFile):
         return file.cell
-    cell_path = path.parent / file.cell
-    if not cell_path.is_file():
+    cell_path = inside(path.parent, file.cell, f"{path}: cell")
+    if not plain_file(cell_path):
         raise InputError(
             f"{path}: cell: {cell_path} is not there; the path counts from the plan's folder"
         )

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from cell.errors import InputError
+from cell.storage.incoming.paths import reason
+from cell.storage.whole import write_whole
 
 
 def results_folder(recording: Path, name: str, kind: str) -> Path:
@@ -27,16 +29,17 @@ def results_folder(recording: Path, name: str, kind: str) -> Path:
 
 def write_results(folder: Path, files: Mapping[str, str]) -> None:
     """Write texts by their file names; raises `InputError` where the folder cannot be written."""
+    make_folder(folder)
+    for name, content in files.items():
+        write_whole(folder / name, content)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder that may be there already; raises `InputError`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, content in files.items():
-            partial = folder / f"{name}.part"
-            partial.write_text(content, encoding="utf-8")
-            partial.replace(folder / name)
-    except OSError as fault:
-        raise InputError(
-            f"{folder}: cannot be written: {fault.strerror}; give another -o"
-        ) from None
+    except (OSError, ValueError) as fault:
+        raise InputError(f"{folder}: cannot be written: {reason(fault)}; give another -o") from None
 
 
 def new_folder(name: str) -> Path:

@@ -13,6 +13,7 @@ from cell.storage.files.cell_file import EffectFile
 from cell.storage.files.parts import Finite, Part, Positive
 from cell.storage.files.plan_file import Plan, read_plan
 from cell.storage.files.yaml_model import check_schema, parse_model, position_of, read_mapping
+from cell.storage.incoming import inside, plain_file
 
 SCHEMA: Final = "cell.study/1"
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -94,7 +95,7 @@ class MonteCarlo(Part):
     """Simulate a plan, calibrate it, and hold the result against the truth."""
 
     plan: str
-    """Path of a plan, counted from the study file."""
+    """Path of a plan, in the study file's folder or below."""
     seeds: PositiveInt
     """How many seeds every case is run with."""
     first_seed: int = Field(default=0, ge=0)
@@ -113,7 +114,7 @@ class PowerStudy(Part):
     """Simulate a plan with one effect at a time, and see whether the diagnosis names it."""
 
     plan: str
-    """Path of a plan, counted from the study file."""
+    """Path of a plan, in the study file's folder or below."""
     seeds: PositiveInt
     """How many seeds each effect is run with at each size, and the cell without any effect."""
     first_seed: int = Field(default=0, ge=0)
@@ -129,7 +130,7 @@ class Recordings(Part):
     """Calibrate or diagnose recordings."""
 
     folders: tuple[str, ...] = Field(min_length=1)
-    """Folders of recordings, or patterns such as `runs/*`, counted from the study file."""
+    """Folders of recordings below the study file's own, or patterns such as `runs/*`."""
     verbs: tuple[Literal["calibrate", "diagnose"], ...] = Field(
         default=("calibrate",), min_length=1
     )
@@ -199,12 +200,12 @@ def read_study(path: Path) -> Study:
     simulated = file.monte_carlo or file.power
     if simulated is None:
         return Study(path, file, None)
-    plan_path = path.parent / simulated.plan
-    if not plan_path.is_file():
-        line, column = position_of(data, (file.kind, "plan"))
+    line, column = position_of(data, (file.kind, "plan"))
+    where = f"{path}:{line}:{column}: {file.kind}.plan"
+    plan_path = inside(path.parent, simulated.plan, where)
+    if not plain_file(plan_path):
         raise InputError(
-            f"{path}:{line}:{column}: {file.kind}.plan: {plan_path} is not there; the path counts"
-            " from the study's folder"
+            f"{where}: {plan_path} is not there; the path counts from the study's folder"
         )
     plan = read_plan(plan_path)
     if plan.cell.simulation is None:

@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cell.errors import InputError
+from cell.storage.whole import write_whole
 
 _ONE_LINE = 4
 """Depth of nesting that still fits a line, with all its values being short."""
@@ -43,12 +44,7 @@ def check_new(path: Path) -> None:
 
 def write_new(path: Path, text: str) -> None:
     """Write a file that is not there yet; raises `InputError`."""
-    check_new(path)
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be written: {fault.strerror}") from None
+    write_whole(path, text, replace=False)
 
 
 def _null(representer: Any, value: None) -> Any:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.error import YAMLError
 
 from cell.errors import InputError
+from cell.storage.incoming import check_values, read_text
+from cell.storage.incoming.limits import YAML_BYTES
 
 Model = TypeVar("Model", bound=BaseModel)
 Location = tuple[int | str, ...]
@@ -54,20 +56,30 @@ def parse_model(path: Path, data: CommentedMap, model: type[Model]) -> Model:
 
 def read_mapping(path: Path) -> CommentedMap:
     """Read a YAML file whose top level is a mapping, keeping line and column of every key."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as broken:
-        raise InputError(f"{path}: is not a text file in UTF-8 (byte {broken.start})") from None
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be read: {fault.strerror}. Check the path.") from None
-    try:
-        data = YAML(typ="rt").load(text)
-    except YAMLError as broken:
-        raise InputError(_yaml_fault(path, broken)) from None
+    data = load_yaml(read_text(path, YAML_BYTES), path, kind="rt")
     if not isinstance(data, CommentedMap):
         found = "is empty" if data is None else f"holds a {type(data).__name__}"
         raise InputError(f"{path}: {found}, expected `key: value` lines at its top level")
+
+    def place(location: Location) -> str:
+        line, column = position_of(data, location)
+        return f"{path}:{line}:{column}: {'.'.join(str(part) for part in location)}"
+
+    check_values(data, place)
     return data
+
+
+def load_yaml(text: str, path: Path, *, kind: Literal["rt", "safe"]) -> Any:
+    """The YAML of a file, with lines and columns (`rt`) or plain; raises `InputError`."""
+    try:
+        return YAML(typ=kind, pure=True).load(text)
+    except YAMLError as broken:
+        raise InputError(_yaml_fault(path, broken)) from None
+    except RecursionError:
+        raise InputError(f"{path}: is nested too deeply") from None
+    except Exception as broken:  # a tag on what it does not fit: the reader's errors have no bound
+        told = str(broken).partition("\n")[0][:200] or type(broken).__name__
+        raise InputError(f"{path}: cannot be read as YAML: {told}") from None
 
 
 def check_schema(path: Path, data: CommentedMap, schema: str) -> None:
@@ -155,10 +167,10 @@ def position_of(data: Any, location: Location) -> tuple[int, int]:
     for part in location:
         if not _has(data, part):
             break
-        if isinstance(data, CommentedMap):
-            line, column = data.lc.key(part)
-        elif isinstance(data, CommentedSeq) and part in (data.lc.data or {}):
-            line, column = data.lc.item(part)
+        known = getattr(getattr(data, "lc", None), "data", None) or {}
+        if part in known:  # what a merge key brought in has no place of its own
+            mapping = isinstance(data, CommentedMap)
+            line, column = data.lc.key(part) if mapping else data.lc.item(part)
         data = data[part]
     return line + 1, column + 1
 

@@ -5,7 +5,8 @@ Public: `read_recording`, `Recording`, `Header`, `FrameRecord`, `Corners`, `Reco
 """
 
 from cell.storage.recording.corners import Corners, read_corners, write_corners
-from cell.storage.recording.frames import FrameRecord, PoseRecord, read_frames
+from cell.storage.recording.frame_log import read_frames
+from cell.storage.recording.frames import FrameRecord, PoseRecord
 from cell.storage.recording.header import Header
 from cell.storage.recording.recording import Recording, frames_as_views, read_recording
 from cell.storage.recording.writer import RecordingWriter

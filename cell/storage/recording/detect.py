@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from numpy.typing import NDArray
 
 from calib.detection import Detection, detect
+from calib.views import Board
 from cell.errors import InputError
 from cell.storage.recording.corners import Corners
-from cell.storage.recording.frames import FrameRecord
 from cell.storage.recording.recording import Recording
 
 log = logging.getLogger(__name__)
 
 Progress = Callable[[int, int], None]
+Load = Callable[[], NDArray[Any]]
 
 
 def detect_corners(recording: Recording, progress: Progress | None = None) -> Corners:
@@ -22,17 +27,27 @@ def detect_corners(recording: Recording, progress: Progress | None = None) -> Co
     A frame whose picture is missing, broken or shows no usable board is rejected with the
     reason; it never stops the others.
     """
+    usable = [frame for frame in recording.frames if frame.frame not in recording.rejected]
+    pictures = [(frame.frame, partial(recording.image, frame)) for frame in usable]
+    found = detect_in_pictures(pictures, recording.board, progress)
+    return found.without(recording.rejected)
+
+
+def detect_in_pictures(
+    pictures: Sequence[tuple[int, Load]], board: Board, progress: Progress | None = None
+) -> Corners:
+    """As `detect_corners`, in pictures with their frame numbers; `InputError` where one is none."""
     found: dict[int, Detection] = {}
     rejected: dict[int, str] = {}
-    for at, frame in enumerate(recording.frames):
-        detection = _detect(recording, frame)
+    for at, (frame, load) in enumerate(pictures):
+        detection = _detect(load, board)
         if isinstance(detection, Detection):
-            found[frame.frame] = detection
+            found[frame] = detection
         else:
-            rejected[frame.frame] = detection
-            log.info("frame %d: %s", frame.frame, detection)
+            rejected[frame] = detection
+            log.info("frame %d: %s", frame, detection)
         if progress is not None:
-            progress(at + 1, len(recording.frames))
+            progress(at + 1, len(pictures))
     return Corners(
         px={number: d.corners_px for number, d in found.items()},
         sigma_px={number: d.sigma_px for number, d in found.items()},
@@ -41,9 +56,9 @@ def detect_corners(recording: Recording, progress: Progress | None = None) -> Co
     )
 
 
-def _detect(recording: Recording, frame: FrameRecord) -> Detection | str:
+def _detect(load: Load, board: Board) -> Detection | str:
     try:
-        result = detect(recording.image(frame), recording.board)
+        result = detect(load(), board)
     except InputError as error:
         return str(error)
     return result if isinstance(result, Detection) else result.reason

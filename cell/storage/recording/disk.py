@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,16 +14,28 @@ from cell.errors import DiskFailed
 
 @contextmanager
 def told(path: Path) -> Iterator[None]:
-    """Turn what the disk refuses into `DiskFailed`; a file that is there already stays an error."""
+    """Turn what the disk refuses into `DiskFailed`."""
     try:
         yield
-    except FileExistsError:
-        raise
     except OSError as fault:
-        raise DiskFailed(
-            f"{path}: the disk does not take it ({fault.strerror}). Free some space, or mend what"
-            " keeps it from being written; what was logged before is whole"
-        ) from None
+        raise DiskFailed(_words(path, fault)) from None
+
+
+def _words(path: Path, fault: OSError) -> str:
+    if isinstance(fault, FileExistsError):
+        return (
+            f"{fault.filename or path}: is there already and is never overwritten. Move it away, or"
+            " start anew with another -o"
+        )
+    if fault.errno in (errno.EMFILE, errno.ENFILE):
+        return (
+            f"{path}: no file descriptor is left to write it with ({fault.strerror}). Raise the"
+            " limit (ulimit -n), or end what holds so many files and connections open"
+        )
+    return (
+        f"{path}: the disk does not take it ({fault.strerror}). Free some space, or mend what"
+        " keeps it from being written; what was logged before is whole"
+    )
 
 
 def write_synced(file: FileIO, data: bytes) -> None:
@@ -31,12 +44,3 @@ def write_synced(file: FileIO, data: bytes) -> None:
     while left:  # a disk that fills up takes a part of it first
         left = left[file.write(left) :]
     os.fsync(file.fileno())
-
-
-def sync_folder(folder: Path) -> None:
-    """Sync the names in a folder; raises `OSError`."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.views import Board, FloatArray, Views
 from cell.errors import InputError
+from cell.storage.incoming import inside, plain_file, read_picture
 from cell.storage.recording import corners as corner_file
 from cell.storage.recording import frames as frame_file
-from cell.storage.recording.corners import Corners, read_corners
-from cell.storage.recording.frames import FrameRecord, read_frames
+from cell.storage.recording.corners import Corners, check_corners, read_corners
+from cell.storage.recording.frame_log import VECTORS, read_frames
+from cell.storage.recording.frames import FrameRecord
 from cell.storage.recording.further import further_numbers, further_words
 from cell.storage.recording.header import Header, read_header
 
 log = logging.getLogger(__name__)
 
-_VECTORS = ("joints_rad", "joint_velocity_rad_s", "approach_joints_rad")
 _SCALARS = ("t_s", "temperature_c", "focus_position", "focus_distance_m", "exposure_s")
-_NO_COVARIATES = ("frame", "image", "base_from_flange", *_VECTORS, *_SCALARS)
+_NO_COVARIATES = ("frame", "image", "base_from_flange", *VECTORS, *_SCALARS)
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,14 @@ class Recording:
         `recording.yaml`.
     frames:
         The lines of `frames.jsonl`, in their order.
+    rejected:
+        Frame number to why its line cannot be used; it has neither pose nor corners.
     """
 
     path: Path
     header: Header
     frames: tuple[FrameRecord, ...]
+    rejected: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -60,11 +63,11 @@ class Recording:
     @property
     def has_detections(self) -> bool:
         """Whether corners came with the recording; its pictures are then not needed."""
-        return (self.path / corner_file.FILE_NAME).exists()
+        return plain_file(self.path / corner_file.FILE_NAME)
 
     def detections(self) -> Corners:
         """The corners that came with the recording; raises `InputError` without any."""
-        return read_corners(self.path / corner_file.FILE_NAME, self.board)
+        return read_corners(self.path / corner_file.FILE_NAME, self.board).without(self.rejected)
 
     def image(self, frame: FrameRecord) -> NDArray[np.generic]:
         """(height, width[, 3]) picture of a frame, as stored.
@@ -74,17 +77,14 @@ class Recording:
         InputError
             The frame has no picture, the file is missing, or it is not an image.
         """
+        return read_picture(self.picture(frame))
+
+    def picture(self, frame: FrameRecord) -> Path:
+        """File of a frame's picture; raises `InputError` where it has none or leads elsewhere."""
         if frame.image is None:
             raise InputError(f"frame {frame.frame} has no picture")
-        file = self.path / frame.image
-        try:
-            data = np.fromfile(file, dtype=np.uint8)
-        except OSError as fault:
-            raise InputError(f"{file}: cannot be read: {fault.strerror}") from None
-        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-        if image is None:
-            raise InputError(f"{file}: is not an image")
-        return image
+        where = f"{self.path / frame_file.FILE_NAME}: frame {frame.frame}: image"
+        return inside(self.path, frame.image, where)
 
     @cached_property
     def size_px(self) -> tuple[int, int]:
@@ -122,13 +122,21 @@ def read_recording(path: Path | str) -> Recording:
         It is no recording, comes from a newer version, or a file in it is broken.
     """
     folder = Path(path)
-    if not folder.is_dir():
+    if not _is_folder(folder):
         raise InputError(f"{folder}: is no folder; a recording is a folder with recording.yaml")
     header = read_header(folder)
-    frames = read_frames(folder / frame_file.FILE_NAME)
-    if not frames:
+    log = read_frames(folder / frame_file.FILE_NAME)
+    if not log.frames:
         raise InputError(f"{folder / frame_file.FILE_NAME}: has no frame")
-    return Recording(folder, header, frames)
+    check_corners(len(log.frames), header.board.board().corner_count, str(folder))
+    return Recording(folder, header, log.frames, log.rejected)
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except ValueError:  # a NUL in its name
+        return False
 
 
 def frames_as_views(
@@ -151,7 +159,7 @@ def frames_as_views(
         mount=header.mount,
         joints=_joint_count(recording.path, frames),
     )
-    columns: dict[str, Any] = {name: _stack(frames, name, blank) for name in _VECTORS + _SCALARS}
+    columns: dict[str, Any] = {name: _stack(frames, name, blank) for name in VECTORS + _SCALARS}
     return replace(
         blank,
         frame=np.array([frame.frame for frame in frames], dtype=np.int64),
@@ -169,7 +177,7 @@ def frames_as_views(
 def _joint_count(path: Path, frames: Sequence[FrameRecord]) -> int:
     counts: dict[int, int] = {}
     for frame in frames:
-        for name in _VECTORS:
+        for name in VECTORS:
             vector = getattr(frame, name)
             if vector is not None:
                 counts.setdefault(len(vector), frame.frame)

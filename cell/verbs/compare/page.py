@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cell.errors import InputError
+from cell.storage.whole import write_whole
 from cell.verbs.compare.comparison import Comparison, Difference
 from cell.verbs.compare.messages import HEAD, TITLES, parts, table, verdict
 from cell.views.report import html
@@ -18,10 +18,7 @@ from cell.views.report.sections.drawing import drawing
 
 def write_page(path: Path, comparison: Comparison) -> None:
     """Write the page; raises `InputError` where the file cannot be written."""
-    try:
-        path.write_text(render(comparison), encoding="utf-8")
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be written: {fault.strerror}") from None
+    write_whole(path, render(comparison))
 
 
 def render(comparison: Comparison) -> str:

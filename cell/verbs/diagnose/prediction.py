@@ -9,6 +9,7 @@ import numpy as np
 
 from calib.chain.model import CellModel, predict
 from calib.views import Views
+from cell.storage.whole import whole_file
 
 BEFORE = "predicted_corners_before.csv"
 AFTER = "predicted_corners.csv"
@@ -17,8 +18,7 @@ AFTER = "predicted_corners.csv"
 def write_prediction(path: Path, model: CellModel, views: Views) -> None:
     """Write `frame,row,col,u_px,v_px` of every corner of every frame that has a pose."""
     pixels = predict(model, views)
-    partial = path.with_name(path.name + ".part")
-    with partial.open("w", newline="", encoding="utf-8") as file:
+    with whole_file(path, newline="") as file:
         rows = csv.writer(file)
         rows.writerow(["frame", "row", "col", "u_px", "v_px"])
         for frame, corners in zip(views.frame, pixels, strict=True):
@@ -27,4 +27,3 @@ def write_prediction(path: Path, model: CellModel, views: Views) -> None:
             for index, (u, v) in enumerate(corners):
                 row, col = divmod(index, views.board.cols)
                 rows.writerow([int(frame), row, col, f"{u:.4f}", f"{v:.4f}"])
-    partial.replace(path)

@@ -89,7 +89,7 @@ def diagnose_into(
     forced = None if effects is None else [named(name) for name in effects]
     corners = corners_of(recording, progress)
     views = same_order_everywhere(recording.views(corners))
-    ahead = None if predict is None else frames_as_views(recording, read_frames(predict))
+    ahead = None if predict is None else frames_as_views(recording, read_frames(predict).frames)
     try:
         found = diagnose(views, log=_together(views, ahead), forced=forced)
     except CalibrationError as error:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from scipy.spatial.transform import RigidTransform
 from calib.detection.orientation import Closure, RoughPoses
 from calib.views import Board, FloatArray, Mount
 from cell.errors import BadAnswer, InputError
+from cell.storage.incoming import plain_file, read_picture
 from cell.storage.recording import (
     Corners,
     FrameRecord,
@@ -26,7 +27,7 @@ from cell.storage.recording import (
     write_corners,
 )
 from cell.storage.recording.corners import FILE_NAME as DETECTIONS
-from cell.storage.recording.detect import Progress, detect_corners
+from cell.storage.recording.detect import Progress, detect_corners, detect_in_pictures
 from cell.verbs.importing.conventions import (
     Candidate,
     Convention,
@@ -125,7 +126,7 @@ def import_source(
     BadAnswer
         The board was found in no picture.
     """
-    if (source / "recording.yaml").exists():
+    if plain_file(source / "recording.yaml"):
         _copy_recording(read_recording(source), folder)
         return _checked(read_recording(folder), None, (), (), progress)
     if source.is_dir():
@@ -135,11 +136,16 @@ def import_source(
 
 def _copy_recording(recording: Recording, folder: Path) -> None:
     """Copy a recording, checked: pictures as they are, every line whole."""
+    pictures = {
+        frame.frame: recording.picture(frame)
+        for frame in recording.frames
+        if frame.image is not None
+    }
     with RecordingWriter.create(folder, recording.header) as writer:
         for frame in recording.frames:
-            if frame.image is not None and (recording.path / frame.image).exists():
-                (folder / frame.image).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(recording.path / frame.image, folder / frame.image)
+            picture = pictures.get(frame.frame)
+            if picture is not None and plain_file(picture):
+                writer.adopt(picture, frame.image or "")
             writer.append(frame)
     if recording.has_detections:
         write_corners(folder / DETECTIONS, recording.detections(), recording.board)
@@ -158,7 +164,7 @@ def _import_pictures(
     header = _header(source, pictures, described)
     corners, posed = None, None
     if series:
-        corners = _corners_of(source, header, pictures, progress)
+        corners = _corners_of(header, pictures, progress)
         posed = _posed(series, pictures, corners, header.board.board(), described)
         header = header.model_copy(update={"imported": _told(header, posed)})
         notes += posed.guessed
@@ -167,7 +173,7 @@ def _import_pictures(
     with RecordingWriter.create(folder, header) as writer:
         for frame, picture in enumerate(pictures):
             name = f"images/{frame:05d}{picture.suffix.lower()}"
-            shutil.copy2(picture, folder / name)
+            writer.adopt(picture, name)
             writer.append(_frame(frame, name, picture, posed))
     against = () if posed is None else posed.convention.contradicted
     return _checked(read_recording(folder), corners, notes, against, progress)
@@ -268,11 +274,9 @@ def _joints(names: Sequence[str], described: Described) -> FloatArray:
     return out
 
 
-def _corners_of(
-    source: Path, header: Header, pictures: Sequence[Path], progress: Progress | None
-) -> Corners:
-    frames = [FrameRecord(frame=k, image=picture.name) for k, picture in enumerate(pictures)]
-    return detect_corners(Recording(source, header, tuple(frames)), progress)
+def _corners_of(header: Header, pictures: Sequence[Path], progress: Progress | None) -> Corners:
+    loads = [(k, partial(read_picture, picture)) for k, picture in enumerate(pictures)]
+    return detect_in_pictures(loads, header.board.board(), progress)
 
 
 def _check(pictures: int, corners: Corners, board: Board, mount: Mount) -> PictureCheck | None:

@@ -6,10 +6,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-import cv2
-import numpy as np
-
 from cell.errors import InputError
+from cell.storage.incoming import read_picture
 from cell.verbs.importing.pose_files import IMAGE_SUFFIXES, visible
 
 _DEPTH = re.compile(r"depth|disparity|(?:^|[_-])(?:ir|infra\w*)(?:[_-]|\d|$)", re.IGNORECASE)
@@ -51,8 +49,9 @@ def pose_files_beside(folder: Path) -> list[str]:
 def picture_size(pictures: Sequence[Path]) -> tuple[int, int]:
     """(height, width) of the first picture that is one; raises `InputError` without any."""
     for picture in pictures:
-        data = np.fromfile(picture, np.uint8)
-        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-        if image is not None:
-            return image.shape[0], image.shape[1]
+        try:
+            image = read_picture(picture)
+        except InputError:
+            continue  # told, with its reason, as a frame without corners
+        return image.shape[0], image.shape[1]
     raise InputError(f"{pictures[0].parent}: none of the {len(pictures)} pictures is an image")

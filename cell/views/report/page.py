@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
+from cell.storage.whole import write_whole
 from cell.views.report import html
 from cell.views.report.data import ReportData
 from cell.views.report.sections.answer import answer
@@ -72,7 +73,7 @@ def write_report(path: Path, data: ReportData) -> None:
 
     Raises
     ------
-    OSError
+    InputError
         Where the file cannot be written.
     """
-    path.write_text(render(data), encoding="utf-8")
+    write_whole(path, render(data))

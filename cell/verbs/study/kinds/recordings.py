@@ -17,6 +17,7 @@ from calib.discovery.diagnose import diagnose
 from calib.errors import CalibrationError
 from cell.errors import BadAnswer, InputError
 from cell.storage.files.study_file import Study
+from cell.storage.incoming import inside
 from cell.storage.recording import Recording, read_recording
 from cell.storage.recording.detect import corners_of
 from cell.storage.recording.header import FILE_NAME
@@ -65,14 +66,17 @@ def _tasks(study: Study) -> list[Job]:
 
 
 def _folders(study: Path, pattern: str) -> list[Path]:
-    """The recordings a pattern means, counted from the study's folder; raises `InputError`."""
+    """The recordings a pattern means, below the study's folder; raises `InputError`."""
+    where = f"{study}: recordings.folders"
+    inside(study.parent, pattern, where)
     matches = [Path(match) for match in sorted(glob.glob(str(study.parent / pattern)))]
     if not matches:
         raise InputError(
             f"{study}: recordings.folders: nothing is at {study.parent / pattern}; the path counts"
             " from the study's folder"
         )
-    folders = [match.resolve() for match in matches if (match / FILE_NAME).is_file()]
+    held = [inside(study.parent, str(m.relative_to(study.parent)), where) for m in matches]
+    folders = [match.resolve() for match in held if (match / FILE_NAME).is_file()]
     if not folders:
         raise InputError(
             f"{study}: recordings.folders: nothing that {pattern} means is a recording, a folder"
