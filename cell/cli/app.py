@@ -19,11 +19,13 @@ from cell.cli.page_option import WithPage
 from cell.cli.plan import plan
 from cell.cli.run import run
 from cell.cli.simulate import simulate
+from cell.cli.streams import lost_output, make_patient
 from cell.cli.study import study
+from cell.cli.unforeseen import words_of
 from cell.cli.verify import verify
 from cell.compiled import prepare
-from cell.errors import EXIT_OPERATOR, exit_status_of
-from cell.views.terminal.output import say_error
+from cell.errors import EXIT_BAD_ANSWER, EXIT_DONE, EXIT_OPERATOR, exit_status_of
+from cell.views.terminal.output import say, say_error
 
 app = typer.Typer(
     name="cell",
@@ -54,16 +56,27 @@ for name, verb in VERBS.items():
 
 def main() -> None:
     """Run the command line and leave with the contract's exit status."""
+    make_patient()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s: %(message)s")
     prepare(sys.argv[1:])
+    status = _status(app)
+    reason = lost_output()
+    if reason:
+        say_error(f"the result could not be printed: {reason}")
+    sys.exit(status)
+
+
+def _status(program: Callable[[], object]) -> int:
+    """Run the program; every error becomes words and an exit status."""
     try:
-        app()
+        program()
+    except SystemExit as left:
+        return left.code if isinstance(left.code, int) else EXIT_DONE
     except KeyboardInterrupt:
-        sys.stderr.write("stopped\n")
-        sys.exit(EXIT_OPERATOR)
+        say("stopped")
+        return EXIT_OPERATOR
     except Exception as error:
         status = exit_status_of(error)
-        if status is None:
-            raise
-        say_error(str(error))
-        sys.exit(status)
+        say_error(words_of(error) if status is None else str(error))
+        return EXIT_BAD_ANSWER if status is None else status
+    return EXIT_DONE

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from cell.cli.json_flag import JsonFlag
+from cell.cli.streams import check_output_whole
 from cell.errors import InputError
 from cell.views.terminal.output import say, show
 
@@ -57,6 +58,7 @@ def export(
         write_whole(output, exported.text)
     if output is None and not as_json:
         sys.stdout.write(exported.text)
+        check_output_whole()
         return
     written = None if output is None else str(output)
     result = {"format": tool, "file": written, "text": exported.text, "warnings": exported.warnings}

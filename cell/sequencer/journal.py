@@ -10,6 +10,8 @@ from typing import Any
 
 from cell.errors import InputError
 from cell.storage.files.plan_file import Plan
+from cell.storage.incoming import plain_file, read_bytes
+from cell.storage.incoming.limits import LOG_BYTES
 from cell.storage.recording.disk import told, write_synced
 
 FILE_NAME = "journal.jsonl"
@@ -26,7 +28,7 @@ class Journal:
 
     def __init__(self, folder: Path) -> None:
         path = folder / FILE_NAME
-        torn = path.exists() and not path.read_bytes().endswith(b"\n")
+        torn = plain_file(path) and not read_bytes(path, LOG_BYTES).endswith(b"\n")
         self._path = path
         self._file = path.open("ab", buffering=0)
         try:
@@ -53,12 +55,13 @@ def read_journal(folder: Path) -> list[dict[str, Any]]:
     """The events of a run; lines that a crash tore are left out."""
     path = folder / FILE_NAME
     events = []
-    for line in path.read_bytes().splitlines() if path.exists() else ():
+    for line in read_bytes(path, LOG_BYTES).splitlines() if plain_file(path) else ():
         try:
             event = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
-        events.append(event)
+        if isinstance(event, dict):
+            events.append(event)
     return events
 
 
@@ -91,5 +94,7 @@ def check_same_plan(folder: Path, plan: Plan, *, simulated: bool) -> list[dict[s
 def skipped_views(events: list[dict[str, Any]]) -> dict[int, str]:
     """View number to reason, of the views that a run gave up."""
     return {
-        int(event["view"]): str(event["reason"]) for event in events if event["event"] == "skip"
+        event["view"]: str(event.get("reason"))
+        for event in events
+        if event.get("event") == "skip" and isinstance(event.get("view"), int)
     }

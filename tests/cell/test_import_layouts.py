@@ -178,7 +178,7 @@ def test_poses_too_far_in_time_are_refused(tmp_path: Path) -> None:
 BROKEN: dict[str, Callable[[], tuple[str, str]]] = {
     "has 5 numbers": lambda: ("p.txt", "1 2 3 4 5\n"),
     "lacks numbers": lambda: ("p.csv", "x,y,z,qx,qy,qz,qw\n1,2,3,0,0,0,1\n1,2,3,0,0,,1\n"),
-    "cannot be read": lambda: ("p.json", "{"),
+    "is no JSON": lambda: ("p.json", "{"),
     "holds no pose": lambda: ("p.yaml", "[]\n"),
     "these are joint angles|holds no pose of the flange": lambda: (
         "p.yaml", "joint_names: [a, b, c, d, e, f]\njoint_values:\n  - [0, 1, 2, 3, 4, 5]\n"),

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from calib.views import Board
+from cell.storage.incoming.limits import BOARD_CORNERS, BOARD_SIDE, DISTANCE_M
 
 
 class _Part(BaseModel):
@@ -15,13 +16,27 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="allow", use_attribute_docstrings=True)
 
 
+Length = Annotated[float, Field(ge=1e-6, le=DISTANCE_M)]
+Described = TypeVar("Described", bound=_Part)
+
+
+def _checked(board: Described, corners: int) -> Described:
+    if corners > BOARD_CORNERS:
+        raise ValueError(f"has {corners} corners; a board has at most {BOARD_CORNERS}")
+    return board
+
+
 class Chessboard(_Part):
     """A chessboard, counted in inner corners."""
 
     type: Literal["chessboard"]
-    rows: int = Field(ge=2)
-    cols: int = Field(ge=2)
-    square_m: PositiveFloat
+    rows: int = Field(ge=2, le=BOARD_SIDE)
+    cols: int = Field(ge=2, le=BOARD_SIDE)
+    square_m: Length
+
+    @model_validator(mode="after")
+    def _countable(self) -> Self:
+        return _checked(self, self.rows * self.cols)
 
     def board(self) -> Board:
         """The board as the calibration knows it."""
@@ -32,11 +47,15 @@ class Charuco(_Part):
     """A ChArUco board, counted in squares."""
 
     type: Literal["charuco"]
-    squares_x: int = Field(ge=3)
-    squares_y: int = Field(ge=3)
-    square_m: PositiveFloat
-    marker_m: PositiveFloat
+    squares_x: int = Field(ge=3, le=BOARD_SIDE)
+    squares_y: int = Field(ge=3, le=BOARD_SIDE)
+    square_m: Length
+    marker_m: Length
     dictionary: str
+
+    @model_validator(mode="after")
+    def _countable(self) -> Self:
+        return _checked(self, (self.squares_x - 1) * (self.squares_y - 1))
 
     def board(self) -> Board:
         """The board as the calibration knows it: its inner corners."""

@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
 
 from calib.paper.focus_law import LAWS
 from calib.views import FloatArray
 from cell.errors import InputError
 from cell.storage.files.yaml_model import read_model
+from cell.storage.incoming.text import read_json
 
 SCHEMA = "cell.calibration/1"
 PREFERENCE = (
@@ -211,7 +212,7 @@ def read_calibration(path: Path) -> CalibrationSource:
         It cannot be read or is something else; with line and column of every error.
     """
     try:
-        return CalibrationSource.model_validate_json(path.read_bytes())
-    except (OSError, ValueError):
+        return CalibrationSource.model_validate(read_json(path))
+    except ValidationError:
         # JSON is YAML, and the YAML reader tells line and column.
         return read_model(path, CalibrationSource, schema=SCHEMA)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, PositiveInt
+from pydantic import Field, PositiveInt, model_validator
 
 from cell.storage.files.parts import Part, Positive
+from cell.storage.incoming.limits import PICTURE_SIDE
+from cell.storage.incoming.pictures import check_pixels
 
 
 class Lens(Part):
@@ -17,16 +19,24 @@ class Lens(Part):
     f_number: Positive = 4.0
 
 
+Side = Annotated[int, Field(gt=0, le=PICTURE_SIDE)]
+
+
 class SimulatedCamera(Part):
     """A camera in this process, and what all cameras have in common."""
 
     driver: Literal["sim"]
     model: str | None = None
-    width: PositiveInt
-    height: PositiveInt
+    width: Side
+    height: Side
     pixel_size_um: Positive | None = None
     focus: Literal["auto", "manual", "motorised", "fixed"] | None = None
     lens: Lens | None = None
+
+    @model_validator(mode="after")
+    def _affordable(self) -> Self:
+        check_pixels(self.width, self.height)
+        return self
 
 
 class FeatureNamesFile(Part):

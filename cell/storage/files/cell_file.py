@@ -15,7 +15,7 @@ from pydantic import ConfigDict, Field, model_validator
 from calib.views import Mount
 from cell.storage.files.board_file import Charuco, Chessboard
 from cell.storage.files.camera_file import CameraFile
-from cell.storage.files.parts import Box, Finite, Joints, Part, Pose, Positive
+from cell.storage.files.parts import Box, Distance, Duration, Finite, Joints, Part, Pose, Positive
 from cell.storage.files.yaml_model import read_model
 
 SCHEMA: Final = "cell.cell/1"
@@ -108,7 +108,7 @@ class Layout(Part):
     """base_from_board (eye in hand) or base_from_camera (eye to hand)."""
     home_deg: Joints
     """Joint angles to start from and to plan around."""
-    distances_m: tuple[Positive, Positive]
+    distances_m: tuple[Distance, Distance]
     """Nearest and farthest distance of the board's centre from the camera worth planning."""
     alpha_px: Positive | None = None
     """The camera's scale factor to a few percent; from lens and pixel size where it is null."""
@@ -143,9 +143,9 @@ class SimulatedLens(Part):
 
     best_blur_px: float = Field(default=0.5, ge=0)
     """Blur at best focus, Gaussian sigma."""
-    focus_distance_m: Positive | None = None
+    focus_distance_m: Distance | None = None
     """Where the lens stands focused at first; at the board, as the first pose sees it, if null."""
-    nearest_focus_m: Positive = 0.1
+    nearest_focus_m: Distance = 0.1
     """Nearest distance of the focus drive."""
 
 
@@ -162,7 +162,7 @@ class Simulation(Part):
     """What a plain model leaves out."""
     noise: Noise = Noise()
     lens: SimulatedLens = SimulatedLens()
-    white_exposure_s: Positive = 0.012
+    white_exposure_s: Duration = 0.012
     """Exposure at which a white board is just not saturated: how well the cell is lit."""
     seed: int = Field(default=0, ge=0)
 

@@ -8,8 +8,12 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from cell.storage.incoming.limits import DISTANCE_M, DURATION_S, MAGNITUDE, SMALLEST
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=SMALLEST, le=MAGNITUDE, allow_inf_nan=False)]
+Duration = Annotated[float, Field(gt=SMALLEST, le=DURATION_S, allow_inf_nan=False)]
+Distance = Annotated[float, Field(gt=SMALLEST, le=DISTANCE_M, allow_inf_nan=False)]
 Point = tuple[Finite, Finite, Finite]
 Joints = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
 

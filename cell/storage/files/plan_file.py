@@ -13,14 +13,18 @@ from pydantic import Discriminator, Field, PositiveInt, Tag, model_validator
 
 from cell.errors import InputError
 from cell.storage.files.cell_file import CellFile, read_cell
-from cell.storage.files.parts import Finite, Joints, Part, Pose, Positive
+from cell.storage.files.parts import Distance, Duration, Finite, Joints, Part, Pose, Positive
 from cell.storage.files.yaml_model import check_schema, parse_model, position_of, read_mapping
 from cell.storage.incoming import inside, plain_file
+from cell.storage.incoming.limits import DURATION_S, FRAME_NUMBER, VIEWS
 from drivers.errors import SafetyError
 
 SCHEMA: Final = "cell.plan/1"
 REDUCED_SPEED_M_S = 0.25
 """Reduced speed of manual operation, ISO 10218-1: more needs a fence."""
+SLOWEST_M_S, FASTEST_M_S = 1e-3, 10.0
+"""Slower, and a move takes hours; faster than any arm of this class."""
+SLOWEST_DEG_S, FASTEST_DEG_S = 0.1, 1000.0
 
 
 def _how_given(cell: object) -> str:
@@ -46,14 +50,14 @@ class View(Part):
     joints_deg: Joints | None = None
     joints_rad: AnyJoints | None = None
     base_from_flange: Pose | None = None
-    frame: int | None = Field(default=None, ge=0)
+    frame: int | None = Field(default=None, ge=0, le=FRAME_NUMBER)
     t_s: Finite | None = None
     joint_velocity_rad_s: AnyJoints | None = None
     approach_joints_rad: AnyJoints | None = None
     temperature_c: Finite | None = None
     focus_position: Finite | None = None
-    focus_distance_m: Finite | None = None
-    exposure_s: Positive | None = None
+    focus_distance_m: Distance | None = None
+    exposure_s: Duration | None = None
     log: dict[str, Finite | str] | None = None
     """Further keys of the log, as they are to stand there."""
 
@@ -75,21 +79,21 @@ class View(Part):
 class Settle(Part):
     """When the arm stands still: judged from its own state."""
 
-    still_s: float = Field(default=0.1, ge=0)
+    still_s: float = Field(default=0.1, ge=0, le=DURATION_S)
     """It must have told so for this long without a break."""
-    timeout_s: Positive = 10.0
+    timeout_s: Duration = 10.0
     """Longer than this after the move, and the view is given up."""
 
 
 class Exposure(Part):
     """The camera's settings during the run."""
 
-    exposure_s: Positive | None = None
+    exposure_s: Duration | None = None
     gain_db: Finite | None = None
     focus: Literal["auto", "hold", "position"] = "hold"
     """`auto`: focus once at every pose, then log; `position`: go to `focus_position`."""
     focus_position: Finite | None = None
-    timeout_s: Positive = 5.0
+    timeout_s: Duration = 5.0
     """How long to wait for a frame."""
 
     @model_validator(mode="after")
@@ -117,7 +121,7 @@ class Checks(Part):
 class Retry(Part):
     """What to do with a frame that fails its checks."""
 
-    attempts: PositiveInt = 3
+    attempts: int = Field(default=3, ge=1, le=1000)
     then: Literal["skip", "stop"] = "skip"
     give_up_after: PositiveInt = 5
     """So many views skipped before the first good frame end the run."""
@@ -139,9 +143,9 @@ class PlanFile(Part):
     name: str
     cell: CellOrPath
     """Path of a cell file in the plan's folder or below, or the cell itself."""
-    speed_m_s: Positive = 0.1
+    speed_m_s: float = Field(default=0.1, ge=SLOWEST_M_S, le=FASTEST_M_S)
     """Greatest speed of the flange; above 0.25 only with `fenced: true`."""
-    joint_speed_deg_s: Positive = 30.0
+    joint_speed_deg_s: float = Field(default=30.0, ge=SLOWEST_DEG_S, le=FASTEST_DEG_S)
     fenced: bool = False
     """People cannot reach the arm while it moves: it may be faster than 0.25 m/s."""
     settle: Settle = Settle()
@@ -150,7 +154,7 @@ class PlanFile(Part):
     retry: Retry = Retry()
     until: Until | None = None
     """End early when the camera is known well enough; all views are taken where this is absent."""
-    views: tuple[View, ...] = Field(min_length=1)
+    views: tuple[View, ...] = Field(min_length=1, max_length=VIEWS)
 
     @model_validator(mode="after")
     def _corners_for_until(self) -> Self:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, Discriminator, Field, PositiveInt, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from cell.errors import InputError
 from cell.storage.files.cell_file import EffectFile
@@ -14,6 +14,7 @@ from cell.storage.files.parts import Finite, Part, Positive
 from cell.storage.files.plan_file import Plan, read_plan
 from cell.storage.files.yaml_model import check_schema, parse_model, position_of, read_mapping
 from cell.storage.incoming import inside, plain_file
+from cell.storage.incoming.limits import FRAME_NUMBER, TASKS
 
 SCHEMA: Final = "cell.study/1"
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -96,9 +97,9 @@ class MonteCarlo(Part):
 
     plan: str
     """Path of a plan, in the study file's folder or below."""
-    seeds: PositiveInt
+    seeds: int = Field(gt=0, le=TASKS)
     """How many seeds every case is run with."""
-    first_seed: int = Field(default=0, ge=0)
+    first_seed: int = Field(default=0, ge=0, le=FRAME_NUMBER)
     cases: tuple[Case, ...] = Field(default=(Case(name="as it is"),), min_length=1)
 
     @model_validator(mode="after")
@@ -115,9 +116,9 @@ class PowerStudy(Part):
 
     plan: str
     """Path of a plan, in the study file's folder or below."""
-    seeds: PositiveInt
+    seeds: int = Field(gt=0, le=TASKS)
     """How many seeds each effect is run with at each size, and the cell without any effect."""
-    first_seed: int = Field(default=0, ge=0)
+    first_seed: int = Field(default=0, ge=0, le=FRAME_NUMBER)
     effects: tuple[EffectFile, ...] | None = None
     """At size 1; amounts not given stand at their usual size. Null: all that such a plan can
     show."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -14,7 +15,7 @@ from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.error import YAMLError
 
 from cell.errors import InputError
-from cell.storage.incoming import check_values, read_text
+from cell.storage.incoming import check_text, check_values, read_text
 from cell.storage.incoming.limits import YAML_BYTES
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -56,7 +57,10 @@ def parse_model(path: Path, data: CommentedMap, model: type[Model]) -> Model:
 
 def read_mapping(path: Path) -> CommentedMap:
     """Read a YAML file whose top level is a mapping, keeping line and column of every key."""
-    data = load_yaml(read_text(path, YAML_BYTES), path, kind="rt")
+    text = read_text(path, YAML_BYTES)
+    check_text(text, path)
+    with _told(path):
+        data = YAML(typ="rt", pure=True).load(text)
     if not isinstance(data, CommentedMap):
         found = "is empty" if data is None else f"holds a {type(data).__name__}"
         raise InputError(f"{path}: {found}, expected `key: value` lines at its top level")
@@ -69,10 +73,19 @@ def read_mapping(path: Path) -> CommentedMap:
     return data
 
 
-def load_yaml(text: str, path: Path, *, kind: Literal["rt", "safe"]) -> Any:
-    """The YAML of a file, with lines and columns (`rt`) or plain; raises `InputError`."""
+def load_yaml_documents(text: str, path: Path) -> list[Any]:
+    """The YAML documents of a text, in plain values; raises `InputError`."""
+    with _told(path):
+        return list(YAML(typ="safe", pure=True).load_all(text))
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Turn whatever the YAML reader raises into `InputError`."""
     try:
-        return YAML(typ=kind, pure=True).load(text)
+        yield
+    except InputError:
+        raise
     except YAMLError as broken:
         raise InputError(_yaml_fault(path, broken)) from None
     except RecursionError:

@@ -6,10 +6,11 @@ its bytes, its values, its pictures and the paths that stand in it from here.
 
 from cell.storage.incoming.paths import inside, plain_file
 from cell.storage.incoming.pictures import decode_picture, read_picture
-from cell.storage.incoming.text import parse_json, read_bytes, read_text
+from cell.storage.incoming.text import check_text, parse_json, read_bytes, read_text
 from cell.storage.incoming.values import check_values
 
 __all__ = [
+    "check_text",
     "check_values",
     "decode_picture",
     "inside",

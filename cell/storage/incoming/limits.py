@@ -10,6 +10,8 @@ YAML_BYTES: Final = 8 * MIB
 """Plans, cells, studies, headers: a plan of 20 000 views. YAML is read slowly."""
 JSON_BYTES: Final = 256 * MIB
 """Results and other tools' poses."""
+POSES_BYTES: Final = 32 * MIB
+"""Poses in another tool's layout: a hundred thousand."""
 LOG_BYTES: Final = 1024 * MIB
 """`frames.jsonl` and `detections.csv`: a million lines."""
 PICTURE_BYTES: Final = 512 * MIB
@@ -26,6 +28,8 @@ VALUES: Final = 2_000_000
 """Values in a file, with everything that an alias repeats counted every time."""
 MAGNITUDE: Final = 1e18
 """No number is larger; in metres it is a hundred light years."""
+SMALLEST: Final = 1e-12
+"""What must be positive is larger: a picosecond, a picometre."""
 DIGITS: Final = 400
 """Digits of a number as text."""
 LINE_CHARACTERS: Final = 100_000
@@ -47,5 +51,9 @@ REACH_M: Final = 1e5
 """A position in a log, also where it is in millimetres."""
 DISTANCE_M: Final = 1e4
 """Of a board, a lens's focus, a work piece."""
+VIEWS: Final = 20_000
+"""Views of a plan."""
+TASKS: Final = 1_000_000
+"""Seeds of a study, and what it makes of them."""
 DURATION_S: Final = 86_400.0
 """Of one thing that is waited for."""

@@ -36,11 +36,10 @@ def decode_picture(data: bytes, where: str) -> NDArray[np.generic]:
     if size is None:
         raise InputError(f"{where}: is not an image ({', '.join(FORMATS)})")
     width_px, height_px = size
-    if width_px * height_px > PICTURE_PIXELS:
-        raise InputError(
-            f"{where}: has {width_px} x {height_px} pixels; at most {PICTURE_PIXELS // 2**20} Mi"
-            " pixels are read"
-        )
+    try:
+        check_pixels(width_px, height_px)
+    except ValueError as many:
+        raise InputError(f"{where}: {many}") from None
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as broken:
@@ -50,6 +49,15 @@ def decode_picture(data: bytes, where: str) -> NDArray[np.generic]:
     if image.dtype not in (np.uint8, np.uint16):
         raise InputError(f"{where}: has pixels of type {image.dtype}; 8 and 16 bits are read")
     return image
+
+
+def check_pixels(width_px: int, height_px: int) -> None:
+    """Raise `ValueError` where a picture of that size is more than is read."""
+    if width_px * height_px > PICTURE_PIXELS:
+        raise ValueError(
+            f"{width_px} x {height_px} pixels are too many; pictures have at most"
+            f" {PICTURE_PIXELS // 10**6} million"
+        )
 
 
 def _size_px(data: bytes) -> tuple[int, int] | None:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from typing import Any
 
 from cell.errors import InputError
-from cell.storage.incoming.limits import DIGITS, JSON_BYTES, MIB
+from cell.storage.incoming.limits import DIGITS, JSON_BYTES, LINE_CHARACTERS, MIB, NESTING
 from cell.storage.incoming.paths import check_plain, reason
 from cell.storage.incoming.values import check_values
+
+_LONG_NUMBER = re.compile(rf"\d{{{DIGITS + 1}}}")
+_BRACKETS = re.compile(r"[\[\]{}]")
+_MANY_MARKS = re.compile(rf"(?:[-?:]\s+){{{NESTING}}}|^\s{{{16 * NESTING}}}\s*\S")
+"""Blocks in blocks: on one line, or by their indentation."""
 
 
 def read_bytes(path: Path, most: int) -> bytes:
@@ -30,7 +36,8 @@ def read_bytes(path: Path, most: int) -> bytes:
         status = os.fstat(handle)
         check_plain(path, status.st_mode)
         with open(handle, "rb", closefd=False) as file:
-            data = file.read(most + 1) if status.st_size <= most else None
+            # no more than asked for is allocated
+            data = file.read(status.st_size + 1) if status.st_size <= most else None
     except OSError as fault:
         raise InputError(f"{path}: cannot be read: {reason(fault)}") from None
     finally:
@@ -56,7 +63,30 @@ def read_text(path: Path, most: int) -> str:
         raise InputError(f"{path}: is not a text file in UTF-8 (byte {broken.start})") from None
 
 
-def parse_json(text: str | bytes, where: str) -> Any:
+def check_text(text: str, path: Path) -> None:
+    """Refuse text on which a reader made for people's files would take for ever.
+
+    Raises
+    ------
+    InputError
+        It has a line or a number without end, or is nested too deeply.
+    """
+    if _LONG_NUMBER.search(text):
+        raise InputError(f"{path}: holds a number of more than {DIGITS} digits")
+    for number, line in enumerate(text.split("\n"), 1):
+        if len(line) > LINE_CHARACTERS:
+            raise InputError(f"{path}:{number}: the line has {len(line)} characters")
+        if _MANY_MARKS.search(line):
+            raise InputError(f"{path}:{number}: is nested too deeply")
+    depth = 0
+    for bracket in _BRACKETS.finditer(text):
+        depth = max(0, depth + (1 if bracket[0] in "[{" else -1))
+        if depth > NESTING:
+            line = text.count("\n", 0, bracket.start()) + 1
+            raise InputError(f"{path}:{line}: is nested more than {NESTING} deep")
+
+
+def parse_json(text: str | bytes, where: str, *, finite: bool = True) -> Any:
     """JSON whose values `check_values` accepts; raises `InputError`."""
     try:
         data = json.loads(text, parse_int=_whole)
@@ -64,7 +94,7 @@ def parse_json(text: str | bytes, where: str) -> Any:
         raise InputError(f"{where}: is nested too deeply") from None
     except ValueError as broken:
         raise InputError(f"{where}: is no JSON: {broken}") from None
-    check_values(data, where)
+    check_values(data, where, finite=finite)
     return data
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, model_validator
 
 from calib.views import Mount
 from cell.storage.files.board_file import BoardFile
+from cell.storage.files.camera_file import Side
 from cell.storage.files.writing import yaml_text
 from cell.storage.files.yaml_model import read_model
+from cell.storage.incoming.pictures import check_pixels
 
 SCHEMA: Final = "cell.recording/1"
 FILE_NAME = "recording.yaml"
@@ -39,10 +41,15 @@ class RecordedCamera(_Part):
     """The camera, as far as it is known."""
 
     model: str | None = None
-    width: PositiveInt | None = None
-    height: PositiveInt | None = None
+    width: Side | None = None
+    height: Side | None = None
     pixel_size_um: PositiveFloat | None = None
     focus: Literal["auto", "manual", "motorised", "fixed"] | None = None
+
+    @model_validator(mode="after")
+    def _affordable(self) -> Self:
+        check_pixels(self.width or 1, self.height or 1)
+        return self
 
 
 class Capture(_Part):

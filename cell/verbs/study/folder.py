@@ -26,6 +26,7 @@ import pyarrow.parquet as pq
 
 from cell.errors import InputError
 from cell.storage.files.study_file import Study
+from cell.storage.incoming.text import read_json
 from cell.verbs.study.kinds import Row
 from cell.verbs.study.work import FAILED
 
@@ -150,14 +151,12 @@ def _same_study(path: Path, study: Study) -> None:
         partial.replace(manifest)
         _sync(path)
         return
-    try:
-        before = json.loads(manifest.read_text(encoding="utf-8"))
-    except ValueError as broken:
-        raise InputError(f"{manifest}: is no JSON ({broken}); give another -o") from None
-    if before.get("schema") != SCHEMA:
+    before = read_json(manifest)
+    schema = before.get("schema") if isinstance(before, dict) else None
+    if schema != SCHEMA:
         raise InputError(
-            f"{path}: was written by another version of this program ({before.get('schema')}, not"
-            f" {SCHEMA}); give another -o"
+            f"{path}: was written by another version of this program ({schema}, not {SCHEMA});"
+            " give another -o"
         )
     changed = _changed(before, json.loads(json.dumps(now)))
     if changed:

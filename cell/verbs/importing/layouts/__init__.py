@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from cell.errors import InputError
+from cell.storage.incoming import check_text, read_text
+from cell.storage.incoming.limits import POSES_BYTES
 from cell.verbs.importing.layouts import (
     assignments,
     delimited,
@@ -47,9 +51,19 @@ def read_file(path: Path) -> list[Series]:
     try:
         if path.suffix.lower() in _ARCHIVES:
             return numpy_archive.read(path)
-        return _read_text(path, path.read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError, ValueError) as fault:
-        raise InputError(f"{path}: cannot be read as poses: {fault}") from None
+        text = read_text(path, POSES_BYTES)
+        check_text(text, path)
+        return _finite(_read_text(path, text))
+    except (ValueError, ArithmeticError, RecursionError) as fault:
+        told = str(fault)[:200] or type(fault).__name__
+        raise InputError(f"{path}: cannot be read as poses: {told}") from None
+
+
+def _finite(found: list[Series]) -> list[Series]:
+    for pose in (pose for series in found for pose in series.poses):
+        if not np.isfinite(pose.values).all():
+            raise InputError(f"{pose.where}: holds a number that is not finite")
+    return found
 
 
 def _read_text(path: Path, text: str) -> list[Series]:

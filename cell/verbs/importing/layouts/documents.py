@@ -6,37 +6,32 @@ numbers row by row; easy_handeye `robot` and `tracking`; `ros topic echo` one do
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
+from cell.errors import InputError
+from cell.storage.files.yaml_model import load_yaml_documents
+from cell.storage.incoming import check_values, parse_json
 from cell.verbs.importing.layouts.nested import series_in
 from cell.verbs.importing.raw import Series
 
 
 def read_json(path: Path, text: str) -> list[Series]:
-    """One JSON value, or one a line; raises `ValueError` where it is broken."""
+    """One JSON value, or one a line; raises `InputError` where it is broken."""
     try:
-        data = json.loads(text)
-    except ValueError:
+        data = parse_json(text, str(path), finite=False)
+    except InputError:
         lines = [line for line in text.splitlines() if line.strip()]
         if len(lines) < 2 or not lines[0].lstrip().startswith("{"):
             raise
-        data = [json.loads(line) for line in lines]
+        data = [parse_json(line, f"{path}:{n}", finite=False) for n, line in enumerate(lines, 1)]
     return series_in(path, data, _tool(data) or "JSON")
 
 
 def read_yaml(path: Path, text: str) -> list[Series]:
-    """One YAML document or several; raises `ValueError` where they are broken."""
-    try:
-        documents = [d for d in YAML(typ="safe", pure=True).load_all(text) if d is not None]
-    except YAMLError as fault:
-        mark = getattr(fault, "problem_mark", None)
-        place = f"line {mark.line + 1}: " if mark else ""
-        raise ValueError(place + str(getattr(fault, "problem", fault))) from None
+    """One YAML document or several; raises `InputError` where they are broken."""
+    documents = [d for d in load_yaml_documents(text, path) if d is not None]
+    check_values(documents, str(path), finite=False)
     data = documents[0] if len(documents) == 1 else documents
     several = "ROS messages" if len(documents) > 1 else "YAML"
     return series_in(path, data, _tool(data) or several)
