@@ -82,8 +82,8 @@ def check_text(text: str, path: Path) -> None:
     for bracket in _BRACKETS.finditer(text):
         depth = max(0, depth + (1 if bracket[0] in "[{" else -1))
         if depth > NESTING:
-            line = text.count("\n", 0, bracket.start()) + 1
-            raise InputError(f"{path}:{line}: is nested more than {NESTING} deep")
+            at = text.count("\n", 0, bracket.start()) + 1
+            raise InputError(f"{path}:{at}: is nested more than {NESTING} deep")
 
 
 def parse_json(text: str | bytes, where: str, *, finite: bool = True) -> Any:

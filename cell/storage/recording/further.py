@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.views import FloatArray
+from cell.storage.incoming.limits import JOINTS
 
 _WORDS = ("station",)
 """Keys whose numbers are names, too."""
@@ -35,6 +36,8 @@ def _numbers(line: Mapping[str, Any]) -> list[tuple[str, float]]:
         if key in _WORDS:
             continue
         listed = isinstance(value, (list, tuple))
+        if listed and len(value) > JOINTS:
+            continue  # no covariate: a curve, a picture
         for at, number in enumerate(value if listed else (value,), start=1):
             if isinstance(number, (int, float)) and math.isfinite(number):
                 found.append((f"{key}_{at}" if listed else key, float(number)))
