@@ -21,6 +21,7 @@ from calib.discovery.diagnosis import (
     Verdict,
 )
 from calib.discovery.history import with_history
+from calib.discovery.laws.contest import law_leads
 from calib.discovery.laws.telling import told_law
 from calib.discovery.locate import Cell, locate
 from calib.discovery.log_consistency.branches import choose_branches, with_branches
@@ -31,7 +32,7 @@ from calib.discovery.prove import held_out, prediction_rms_px, prove
 from calib.discovery.rejections import LostFrames, lost_frames
 from calib.discovery.residual_structure import ResidualStructure, find_residual_structure
 from calib.discovery.scatter import scattered
-from calib.discovery.search import Search
+from calib.discovery.search import UNDECIDED, Search
 from calib.discovery.split import split_misfit
 from calib.discovery.start import Fitter, fit_start
 from calib.distributions import chi2_tail
@@ -91,7 +92,7 @@ def _with_lost_frames(found: Diagnosis, lost: LostFrames | None) -> Diagnosis:
 def _searched(search: Search, before: JointFit) -> ResidualStructure:
     """Search; and once more with a focal length that scatters by chance, where it does."""
     search.run()
-    structure = find_residual_structure(search)
+    structure = _or_laws_first(find_residual_structure(search), before)
     scatter = scattered(structure)
     if scatter is None:
         return structure
@@ -100,6 +101,22 @@ def _searched(search: Search, before: JointFit) -> ResidualStructure:
     again = Search(start, search.fitter, search.branch_price)
     again.run()
     return find_residual_structure(again, (scatter.cell,))
+
+
+def _or_laws_first(structure: ResidualStructure, before: JointFit) -> ResidualStructure:
+    """The same search begun with a law where one beats every single name in the plain cell.
+
+    What no name fits may be soaked up by two or three, none of which a law could replace alone.
+    """
+    search = structure.search
+    if not search.steps:
+        return structure
+    again = Search(before, search.fitter, search.branch_price)
+    if not law_leads(again):
+        return structure
+    other = find_residual_structure(again)
+    better = again.best.criterion < search.best.criterion - UNDECIDED
+    return other if better else structure
 
 
 def _with_branches(repaired: LogRepair) -> tuple[LogRepair, float]:

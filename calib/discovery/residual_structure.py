@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from calib.chain.empirical import present_curve
 from calib.chain.model import walk
 from calib.discovery.laws.contest import as_cell, demanded
+from calib.discovery.laws.review import drop_unsupported, replaced_by_laws
 from calib.discovery.locate import Cell, locate
 from calib.discovery.search import Search
 from calib.views import Views
@@ -19,6 +20,9 @@ _LAW_SHARE = 0.03
 
 _SHAPE_SHARE = 0.2
 """The same where it follows the very covariate that the effect acts along."""
+
+_REMAINDER = 0.05
+"""A term without a name that gains less than this share of those before is what they left over."""
 
 _MOST_CURVES = 3
 
@@ -52,16 +56,31 @@ def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> Res
 
     `known` is what is known to be left already.
     """
+    found = _carried(search)
+    replacing = replaced_by_laws(search)
+    if replacing:
+        found += replacing + _carried(search)
+    search.drop_on_joints({cell.site for cell in found})
+    search.drop_beside_curves()
+    drop_unsupported(search)
+    present = {p.effect.label for p in search.best.fit.model.effects}
+    kept = [cell for cell in found if cell.law is None or cell.law.effect.label in present]
+    return ResidualStructure(search, known + tuple(kept))
+
+
+def _carried(search: Search) -> list[Cell]:
+    """Carry what is left by laws and curves, one after the other, until nothing is."""
     found: list[Cell] = []
     views = search.views
     for _ in range(_MOST_CURVES):
-        law = _law(search)
+        known = sum(cell.score.gain for cell in found)
+        law = _law(search, _REMAINDER * known)
         if law is not None:
             found.append(law)
             continue
         told = alarms(locate(search.best.fit, views))
         cell = next((c for c in told if not is_shape_of_law(c, search)), None)
-        if cell is None:
+        if cell is None or cell.score.gain < _REMAINDER * known:
             break
         found.append(cell)
         if cell.is_field:
@@ -69,21 +88,20 @@ def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> Res
             break
         if not (_carried_finer(search, found, views) or _carry(search, cell, views)):
             break
-    search.drop_on_joints({cell.site for cell in found})
-    search.drop_beside_curves()
-    present = {p.effect.label for p in search.best.fit.model.effects}
-    kept = [cell for cell in found if cell.law is None or cell.law.effect.label in present]
-    return ResidualStructure(search, known + tuple(kept))
+    return found
 
 
-def _law(search: Search) -> Cell | None:
-    """Take in the law that is demanded, and see which names are still needed beside it."""
+def _law(search: Search, least: float) -> Cell | None:
+    """Take in the law that is demanded, and see which names are still needed beside it.
+
+    What gains less than `least` is what the laws before it have left of their own.
+    """
     before = search.best
     told = demanded(search)
     if not told:
         return None
     cell = as_cell(told, before)
-    if is_shape_of_law(cell, search):
+    if cell.score.gain < least or is_shape_of_law(cell, search):
         return None
     search.take_in(told[0].candidate, told[0].trial.fit)
     search.run()

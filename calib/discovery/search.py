@@ -74,6 +74,13 @@ class Step:
     rivals: tuple[tuple[Present, float], ...]
 
 
+def blank(present: Present) -> Present:
+    """The effect with its amounts at zero and its shapes and settings as they are."""
+    roles = [p.role for p in present.effect.parameters]
+    values = np.where([role == "amount" for role in roles], 0.0, present.values)
+    return replace(present, values=values)
+
+
 def criterion(fit: JointFit, views: Views) -> float:
     """-2 log likelihood and the price of the free numbers."""
     return -bic(-fit.minus_two_log, fit.parameters, views)
@@ -121,6 +128,10 @@ class Search:
         fine = [shape for candidate, _ in best for shape in finer(candidate, self.views)]
         ranked = self._best_shapes(fit, fine)
         return sorted(ranked, key=lambda pair: -self._promise(*pair))
+
+    def promised(self, fit: JointFit) -> float:
+        """What the most promising name promises."""
+        return max((self._promise(*pair) for pair in self.ranked(fit)), default=-np.inf)
 
     def _best_shapes(
         self, fit: JointFit, tried: Sequence[Candidate]
@@ -284,6 +295,12 @@ class Search:
         self._settle(tried)
         return True
 
+    def leave_out(self, present: Present) -> None:
+        """Go on without an effect, whatever that costs."""
+        _, without = self.missed(present)
+        self._settle(without)
+        self.steps = [s for s in self.steps if s.taken.effect != present.effect]
+
     def drop_beside_field(self, site: str, field_gain: float) -> None:
         """Drop what the pictures no longer ask for once a field of shifts is allowed for.
 
@@ -334,7 +351,7 @@ class Search:
         """
         effects = self.best.fit.model.effects
         curves = [p for p in effects if p.effect.name == "empirical"]
-        worth = {curve.effect.label: self._missed(curve)[0] for curve in curves}
+        worth = {curve.effect.label: self.missed(curve)[0] for curve in curves}
         for present in effects:
             in_link = (c for c in curves if c.effect.link == present.effect.link)
             if present.effect.seen_without_robot:
@@ -343,12 +360,12 @@ class Search:
                 least = _POSE_SHARE * sum(worth.values())
             if present.effect.name == "empirical" or least == 0.0:
                 continue
-            missed, without = self._missed(present)
+            missed, without = self.missed(present)
             if missed < least:
                 self._settle(without)
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
 
-    def _missed(self, present: Present) -> tuple[float, JointFit]:
+    def missed(self, present: Present) -> tuple[float, JointFit]:
         """By how much the criterion rises without an effect, and the fit without it."""
         rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
         without = self.fitter.with_effects(self.best.fit, rest)

@@ -58,6 +58,13 @@ def demanded(search: Search) -> list[Tried]:
     return [t for t in tried if t.trial.criterion < tried[0].trial.criterion + UNDECIDED]
 
 
+def law_leads(search: Search) -> bool:
+    """Whether in the cell as it is a law promises more than any name does."""
+    fit = search.best.fit
+    laws = promising(fit, search, 1)
+    return bool(laws) and laws[0].worth > search.promised(fit)
+
+
 def _rival(rival: Tried, best: Tried) -> str:
     law = rival.found.law
     along = " * ".join(covariate.name for covariate in law.covariates)

@@ -50,6 +50,9 @@ class FrameBlocks:
         (N, T + S, T + S) and (N, T + S), corner noise and the frames' own errors accounted for.
     prior, pull:
         (T,) inverse variances of the shared numbers' priors, and their gradient.
+    pixel_information, pixel_gradient, pixel_square, corners:
+        (N, T + S, T + S), (N, T + S), (N,) and (N,): the same form of the squared distances (px) of
+        the corners from where the log alone has them, its constant, and the corners' weights.
     """
 
     components: tuple[Component, ...]
@@ -58,6 +61,10 @@ class FrameBlocks:
     gradient: FloatArray
     prior: FloatArray
     pull: FloatArray
+    pixel_information: FloatArray
+    pixel_gradient: FloatArray
+    pixel_square: FloatArray
+    corners: FloatArray
 
     @property
     def shared(self) -> int:
@@ -82,14 +89,26 @@ def frame_blocks(fit: JointFit, views: Views) -> FrameBlocks:
     components = tuple(Component(s, k) for s in sites for k in range(len(s.components)))
     columns = found.local[:, :, base:] * np.array([c.typical for c in components])
     mapping = np.concatenate([found.local[:, :, :base], columns], axis=2)
-    information, gradient = _marginal(fit, views, found, mapping)
+    raw = _raw(fit, views, found, mapping)
+    information, gradient = _marginal(fit, raw)
     corners = fit.equations.corner_numbers
     order = _corners_first(base, len(components), corners)
-    information = information[:, order][:, :, order]
     print_information = fit.noise.print_m**-2.0 if corners else 0.0
     prior = np.concatenate([prior_information(fit.unknowns), np.full(corners, print_information)])
     at = np.concatenate([amounts(fit.model, fit.unknowns), fit.equations.corner_shift])
-    return FrameBlocks(components, state, information, gradient[:, order], prior, -prior * at)
+    return FrameBlocks(
+        components=components,
+        state=state,
+        information=information[:, order][:, :, order],
+        gradient=gradient[:, order],
+        prior=prior,
+        pull=-prior * at,
+        pixel_information=raw.shared[:, order][:, :, order],
+        pixel_gradient=raw.gradient[:, order]
+        + np.einsum("nfp,nf->np", raw.cross[:, :, order], fit.own_error),
+        pixel_square=_unmoved_square(raw, fit.own_error),
+        corners=fit.weight.sum(axis=1),
+    )
 
 
 def _corners_first(base: int, sites: int, corners: int) -> list[int]:
@@ -98,10 +117,37 @@ def _corners_first(base: int, sites: int, corners: int) -> list[int]:
     return [*range(base), *range(after, after + corners), *range(base, after)]
 
 
-def _marginal(
-    fit: JointFit, views: Views, found: Dependence, mapping: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+@dataclass(frozen=True)
+class _Raw:
+    """Normal equations of each frame, in its own F numbers and P others, in pixels."""
+
+    own: FloatArray
+    cross: FloatArray
+    own_residual: FloatArray
+    shared: FloatArray
+    gradient: FloatArray
+    square: FloatArray
+
+
+def _unmoved_square(raw: _Raw, own_error: FloatArray) -> FloatArray:
+    """(N,) squared misfit of frames whose own errors are not known."""
+    moved = np.einsum("nf,nfg,ng->n", own_error, raw.own, own_error)
+    return np.asarray(raw.square + 2.0 * np.einsum("nf,nf->n", own_error, raw.own_residual) + moved)
+
+
+def _marginal(fit: JointFit, raw: _Raw) -> tuple[FloatArray, FloatArray]:
     """(N, P, P) information and (N, P) gradient with each frame's own errors integrated out."""
+    scale = fit.noise.corner_px**-2.0
+    prior = fit.noise.own_information
+    inverse = np.linalg.inv(raw.own * scale + prior)
+    pulled = raw.own_residual * scale - fit.own_error @ prior
+    back = inverse @ (raw.cross * scale)
+    information = raw.shared * scale - np.swapaxes(raw.cross, 1, 2) @ back * scale
+    gradient = raw.gradient * scale - np.einsum("nfp,nf->np", back, pulled)
+    return 0.5 * (information + np.swapaxes(information, 1, 2)), gradient
+
+
+def _raw(fit: JointFit, views: Views, found: Dependence, mapping: FloatArray) -> _Raw:
     state, with_corners = found.state, bool(fit.equations.corner_numbers)
     local = local_equations(
         state.optics,
@@ -123,14 +169,7 @@ def _marginal(
     gradient = np.einsum("nqp,nq->np", mapping, gram[:, :-1, -1])
     if with_corners:
         shared, gradient, cross = _corner_rows(local, found, mapping, shared, gradient, cross)
-    scale = fit.noise.corner_px**-2.0
-    prior = fit.noise.own_information
-    inverse = np.linalg.inv(own * scale + prior)
-    pulled = cross_residual * scale - fit.own_error @ prior
-    back = inverse @ (cross * scale)
-    information = shared * scale - np.swapaxes(cross, 1, 2) @ back * scale
-    gradient = gradient * scale - np.einsum("nfp,nf->np", back, pulled)
-    return 0.5 * (information + np.swapaxes(information, 1, 2)), gradient
+    return _Raw(own, cross, cross_residual, shared, gradient, gram[:, -1, -1])
 
 
 def _corner_rows(
@@ -162,3 +201,11 @@ def _corner_rows(
         np.concatenate([gradient, rows[:, :, -1]], axis=1),
         np.concatenate([cross, own_corner], axis=2),
     )
+
+
+def inverse_root(information: FloatArray) -> FloatArray:
+    """(T, R) matrix whose product with its own transpose is the (pseudo-)inverse."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    value, vector = np.linalg.eigh(information * scale[:, None] * scale[None, :])
+    kept = value > 1e-10 * max(float(value[-1]), 1e-300)
+    return np.asarray(scale[:, None] * vector[:, kept] / np.sqrt(value[kept]))

@@ -15,17 +15,20 @@ import numpy as np
 from calib.chain.covariates import Covariate, covariates_of
 from calib.chain.laws import forms
 from calib.chain.laws.form import Form, Numbers, Range
-from calib.chain.laws.law import Law, functions_of, may_need_constant
-from calib.discovery.laws.frames import FrameBlocks
+from calib.chain.laws.law import Law, may_need_constant
+from calib.discovery.laws.frames import FrameBlocks, inverse_root
 from calib.discovery.score import pose_numbers
-from calib.views import FloatArray, Views
+from calib.views import BoolArray, FloatArray, Views
 
 _LEAST_SPREAD = 1e-9
+_NOTHING, _DEPENDENT = 1e-9, 1e-5
+_KNOWN_SHARE = 0.8
+"""Of the frames that must have a covariate."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """A law, and what it promises.
+    """A law, and what it promises, with or without its own constant.
 
     Attributes
     ----------
@@ -70,6 +73,36 @@ def _groups(blocks: FrameBlocks) -> list[_Group]:
     return groups
 
 
+@dataclass(frozen=True)
+class _Try:
+    """One form along its covariates, with its numbers."""
+
+    covariates: tuple[Covariate, ...]
+    numbers: Numbers
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """A try for a group of components, and what it promises."""
+
+    form: Form
+    tried: _Try
+    group: _Group
+    gain: float
+    columns: int
+    choices: float
+    worth: float
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A covariate's values, zero where they are not known, which are, and their range."""
+
+    value: FloatArray
+    known: BoolArray
+    seen: Range
+
+
 class Scan:
     """One linearisation and everything that can be asked of it."""
 
@@ -78,12 +111,12 @@ class Scan:
         self.groups = _groups(blocks)
         t = blocks.shared
         information, gradient = blocks.base()
-        root = _root(information)
+        root = inverse_root(information)
         self._cross = blocks.information[:, :t, t:].transpose(0, 2, 1) @ root
         self._at = root.T @ gradient
         self._own = blocks.information[:, t:, t:]
         self._gradient = blocks.gradient[:, t:]
-        self.values: dict[str, FloatArray] = {}
+        self._values: dict[str, _Known] = {}
         self.covariates = [c for c in covariates_of(views) if self._varies(c)]
         self.number = float(np.log(pose_numbers(views)))
         self._pairs = float(np.log(len(self.groups) * max(len(self.covariates), 1)))
@@ -93,82 +126,83 @@ class Scan:
         value = covariate.of(self.blocks.state)
         if value.ndim > 1:
             return False
-        self.values[covariate.name] = value
-        known = value[np.isfinite(value)]
-        return len(known) > 0.8 * len(value) and float(np.ptp(known)) > _LEAST_SPREAD
+        known = np.isfinite(value)
+        if known.sum() <= _KNOWN_SHARE * len(value) or np.ptp(value[known]) < _LEAST_SPREAD:
+            return False
+        seen = Range(float(value[known].min()), float(value[known].max()))
+        safe = np.where(known, value, seen.middle)
+        self._values[covariate.name] = _Known(safe, known, seen)
+        return True
 
     def best(self, at_most: int) -> list[Found]:
         """The most promising laws, no two of the same site, covariates and form."""
-        found = [f for form in forms() if form.covariates == 1 for f in self._singly(form)]
-        found += [f for form in forms() if form.covariates == 2 for f in self._paired(form)]
-        told: dict[tuple[str, str, str], Found] = {}
-        for one in sorted(found, key=lambda f: -f.worth):
-            along = "*".join(c.name for c in one.law.covariates)
-            told.setdefault((one.law.site.name, along, one.law.form.key), one)
+        judged = [one for form in forms() for one in self._of_form(form)]
+        told: dict[tuple[str, str, str], _Judged] = {}
+        for one in sorted(judged, key=lambda j: -j.worth):
+            along = "*".join(c.name for c in one.tried.covariates)
+            told.setdefault((one.group.site, along, one.form.key), one)
             if len(told) == at_most:
                 break
-        return list(told.values())
+        return [
+            Found(self._law(one), one.gain, one.columns, one.choices, one.worth)
+            for one in told.values()
+        ]
 
-    def _singly(self, form: Form) -> Iterator[Found]:
-        for covariate in self.covariates:
-            value = self.values[covariate.name]
-            if form.fits(covariate.name, value):
-                yield from self._along(form, covariate)
-
-    def _paired(self, form: Form) -> Iterator[Found]:
-        """The best pair of covariates for each group of components."""
-        known = [c for c in self.covariates if form.fits(c.name, self.values[c.name])]
-        pairs = [(a, b) for k, a in enumerate(known) for b in known[k + 1 :]]
-        if not pairs:
+    def _of_form(self, form: Form) -> Iterator[_Judged]:
+        fitting = [c for c in self.covariates if form.fits(c.name, self._values[c.name].value)]
+        if form.covariates > 1:
+            pairs = [(a, b) for k, a in enumerate(fitting) for b in fitting[k + 1 :]]
+            yield from self._judged(form, [[_Try(pair, {}) for pair in pairs]], "")
             return
-        functions = np.stack([self._functions(form, pair, {}) for pair in pairs])
-        ways = float(np.log(len(self.groups) * len(pairs))) + self._forms
-        for group, gains in self._gains(functions, ""):
-            best = int(np.argmax(gains))
-            law = self._law(form, pairs[best], {}, group)
-            yield self._found(law, float(gains[best]), ways)
+        tries = {c.name: self._tries(form, c) for c in fitting}
+        around = [c.name for c in fitting if c.cyclic and form.key == "periodic"]
+        for name in around:
+            yield from self._judged(form, [tries[name]], name)
+        yield from self._judged(form, [t for n, t in tries.items() if n not in around], "")
 
-    def _functions(
-        self, form: Form, covariates: tuple[Covariate, ...], numbers: Numbers
-    ) -> FloatArray:
-        values = [self.values[c.name] for c in covariates]
-        return functions_of(form, values, self._ranges(covariates), numbers)
+    def _tries(self, form: Form, covariate: Covariate) -> list[_Try]:
+        known = self._values[covariate.name]
+        value = np.where(known.known, known.value, np.nan)
+        return [_Try((covariate,), n) for n in form.tried([value], [known.seen])]
 
-    def _ranges(self, covariates: tuple[Covariate, ...]) -> tuple[Range, ...]:
-        values = [self.values[c.name] for c in covariates]
-        return tuple(Range(float(np.nanmin(v)), float(np.nanmax(v))) for v in values)
+    def _judged(self, form: Form, contests: list[list[_Try]], only: str) -> Iterator[_Judged]:
+        """For every group of components (of one site, if given) the best try of each contest."""
+        contests = [contest for contest in contests if contest]
+        if not contests:
+            return
+        functions = np.stack([self._functions(form, t) for contest in contests for t in contest])
+        ends = np.cumsum([len(contest) for contest in contests])
+        for group, gains in self._gains(functions, only):
+            for contest, part in zip(contests, np.split(gains, ends[:-1]), strict=True):
+                best = int(np.argmax(part))
+                yield self._found(form, contest, best, group, float(part[best]))
 
-    def _found(self, law: Law, gain: float, ways: float) -> Found:
-        shapes = sum(number.fitted for number in law.form.numbers)
-        columns = len(law.form.functions) * len(law.components) + shapes
+    def _functions(self, form: Form, one: _Try) -> FloatArray:
+        known = [self._values[c.name] for c in one.covariates]
+        every = np.all([k.known for k in known], axis=0)
+        functions = form.of([k.value for k in known], [k.seen for k in known], one.numbers)
+        return np.asarray(functions * every[:, None])
+
+    def _found(
+        self, form: Form, contest: list[_Try], best: int, group: _Group, gain: float
+    ) -> _Judged:
+        pairs = self._pairs if form.covariates == 1 else float(np.log(len(self.groups)))
+        ways = pairs + self._forms + float(np.log(len(contest)))
+        columns = len(form.functions) * len(group.members)
+        columns += sum(number.fitted for number in form.numbers)
         worth = gain - columns * self.number - 2.0 * ways
-        return Found(law, gain, columns + law.constant, ways, worth)
+        return _Judged(form, contest[best], group, gain, columns, ways, worth)
 
-    def _along(self, form: Form, covariate: Covariate) -> Iterator[Found]:
-        """The best numbers for each group of components."""
-        along = (covariate,)
-        tried = form.tried([self.values[covariate.name]], self._ranges(along))
-        if not tried:
-            return
-        functions = np.stack([self._functions(form, along, numbers) for numbers in tried])
-        ways = self._pairs + self._forms + float(np.log(len(tried)))
-        swings = form.key == "periodic" and covariate.cyclic
-        for group, gains in self._gains(functions, covariate.name if swings else ""):
-            best = int(np.argmax(gains))
-            law = self._law(form, along, tried[best], group)
-            yield self._found(law, float(gains[best]), ways)
-
-    def _law(
-        self, form: Form, covariates: tuple[Covariate, ...], numbers: Numbers, group: _Group
-    ) -> Law:
-        members = [self.blocks.components[k] for k in group.members]
+    def _law(self, one: _Judged) -> Law:
+        members = [self.blocks.components[k] for k in one.group.members]
+        along = one.tried.covariates
         law = Law(
             site=members[0].site,
             components=tuple(m.index for m in members),
-            form=form,
-            covariates=covariates,
-            ranges=self._ranges(covariates),
-            numbers=tuple(numbers.items()),
+            form=one.form,
+            covariates=along,
+            ranges=tuple(self._values[c.name].seen for c in along),
+            numbers=tuple(one.tried.numbers.items()),
         )
         return replace(law, constant=may_need_constant(law))
 
@@ -200,21 +234,14 @@ class Scan:
         return information, score.reshape(g, s * b) - flat @ self._at
 
 
-def _root(information: FloatArray) -> FloatArray:
-    """(T, R) matrix whose product with its own transpose is the (pseudo-)inverse."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    value, vector = np.linalg.eigh(information * scale[:, None] * scale[None, :])
-    kept = value > 1e-10 * max(float(value[-1]), 1e-300)
-    return np.asarray(scale[:, None] * vector[:, kept] / np.sqrt(value[kept]))
-
-
 def _gain(information: FloatArray, score: FloatArray) -> FloatArray:
     """(G,) of (G, E, E) and (G, E): what the columns gain, dependent directions left out."""
     diagonal = np.einsum("gee->ge", information)
-    scale = np.where(diagonal > 1e-9, 1.0 / np.sqrt(np.maximum(diagonal, 1e-9)), 0.0)
+    scale = np.where(diagonal > _NOTHING, 1.0 / np.sqrt(np.maximum(diagonal, _NOTHING)), 0.0)
+    scaled = score * scale
     if information.shape[1] == 1:
-        return np.asarray((score[:, 0] * scale[:, 0]) ** 2)
-    value, vector = np.linalg.eigh(information * scale[:, :, None] * scale[:, None, :])
-    along = np.einsum("gek,ge->gk", vector, score * scale)
-    safe = np.where(value > 1e-5, value, np.inf)
-    return np.asarray((along**2 / safe).sum(axis=1))
+        return np.asarray(scaled[:, 0] ** 2)
+    normal = information * scale[:, :, None] * scale[:, None, :]
+    normal += _DEPENDENT * np.eye(information.shape[1])
+    solved = np.linalg.solve(normal, scaled[:, :, None])[:, :, 0]
+    return np.asarray(np.einsum("ge,ge->g", scaled, solved))

@@ -1,0 +1,95 @@
+"""What each effect is worth to frames that had no say in its amounts.
+
+The fit's quadratic forms, frame by frame, let blocks of frames be left out and predicted at the
+price of a few small solutions: the noise levels and the shapes stay as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.discovery.laws.frames import FrameBlocks, inverse_root
+from calib.solver.joint import JointFit
+from calib.views import BoolArray, FloatArray
+
+_FOLDS = 8
+_BLOCK_FRAMES = 2
+
+
+@dataclass(frozen=True)
+class Worth:
+    """What the left-out frames lose without an effect.
+
+    Attributes
+    ----------
+    minus_two_log:
+        Rise of -2 log likelihood over all frames, each left out once.
+    gain_px:
+        Rise of the RMS distance of the corners from where they are predicted by the log alone.
+    """
+
+    minus_two_log: float
+    gain_px: float
+
+    @property
+    def supported(self) -> bool:
+        """Whether the left-out frames want the effect at all."""
+        return self.minus_two_log > 0.0
+
+
+def folds(frames: int) -> NDArray[np.int64]:
+    """(N,) number of the fold: short blocks of neighbours, dealt round."""
+    return (np.arange(frames) // _BLOCK_FRAMES) % min(_FOLDS, max(frames // _BLOCK_FRAMES, 2))
+
+
+class CrossValidation:
+    """Every fold of a fit solved once without its own frames."""
+
+    def __init__(self, fit: JointFit, blocks: FrameBlocks) -> None:
+        self.fit, self.blocks = fit, blocks
+        fold = folds(len(blocks.gradient))
+        self.left_out = [fold == k for k in np.unique(fold)]
+        self.train = [blocks.base(~out) for out in self.left_out]
+        self.whole = self._lost(np.zeros(0, dtype=np.int64), np.zeros(0))
+
+    def without(self, effect: int) -> Worth:
+        """What the effect of that index in the fit's model is worth."""
+        mine = [
+            (k, u.place[2])
+            for k, u in enumerate(self.fit.unknowns)
+            if u.place[0] == "effect" and u.place[1] == effect
+        ]
+        present = self.fit.model.effects[effect]
+        zero = [
+            -present.values[p] if present.effect.parameters[p].role == "amount" else 0.0
+            for _, p in mine
+        ]
+        lost = self._lost(np.array([k for k, _ in mine], dtype=np.int64), np.array(zero))
+        return Worth(lost[0] - self.whole[0], lost[1] - self.whole[1])
+
+    def _lost(self, held: NDArray[np.int64], at: FloatArray) -> tuple[float, float]:
+        """(-2 log likelihood but for a constant, RMS px) with some numbers held at a step."""
+        free = np.setdiff1d(np.arange(self.blocks.shared), held)
+        quadratic, square_px, weight = 0.0, 0.0, 0.0
+        for out, (information, gradient) in zip(self.left_out, self.train, strict=True):
+            step = np.zeros(self.blocks.shared)
+            step[held] = at
+            right = gradient[free] - information[np.ix_(free, held)] @ at
+            root = inverse_root(information[np.ix_(free, free)])
+            step[free] = root @ (root.T @ right)
+            quadratic += _form(self.blocks.information, self.blocks.gradient, out, step)
+            square_px += _form(self.blocks.pixel_information, self.blocks.pixel_gradient, out, step)
+            square_px += float(self.blocks.pixel_square[out].sum())
+            weight += float(self.blocks.corners[out].sum())
+        return quadratic, float(np.sqrt(max(square_px, 0.0) / max(weight, 1.0)))
+
+
+def _form(
+    information: FloatArray, gradient: FloatArray, frames: BoolArray, step: FloatArray
+) -> float:
+    t = len(step)
+    h, g = information[frames, :t, :t].sum(axis=0), gradient[frames, :t].sum(axis=0)
+    return float(step @ h @ step - 2.0 * step @ g)
