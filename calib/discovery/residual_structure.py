@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from calib.chain.empirical import present_curve
 from calib.chain.model import walk
 from calib.discovery.laws.contest import as_cell, demanded
-from calib.discovery.laws.review import drop_unsupported, replaced_by_laws
+from calib.discovery.laws.review import drop_beside_kinematics, drop_unsupported, replaced_by_laws
 from calib.discovery.locate import Cell, locate
 from calib.discovery.search import Search
 from calib.views import Views
@@ -62,6 +62,7 @@ def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> Res
         found += replacing + _carried(search)
     search.drop_on_joints({cell.site for cell in found})
     search.drop_beside_curves()
+    drop_beside_kinematics(search)
     drop_unsupported(search)
     present = {p.effect.label for p in search.best.fit.model.effects}
     kept = [cell for cell in found if cell.law is None or cell.law.effect.label in present]

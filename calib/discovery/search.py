@@ -74,6 +74,21 @@ class Step:
     rivals: tuple[tuple[Present, float], ...]
 
 
+def within_bounds(fit: JointFit, label: str) -> bool:
+    """Whether every fitted amount of an effect is one that a sane cell can have.
+
+    An amount that was pushed to the end of its range fits something else.
+    """
+    for present in fit.model.effects:
+        if present.effect.label != label:
+            continue
+        for k in present.free:
+            parameter, value = present.effect.parameters[k], present.values[k]
+            if value != 0.0 and not parameter.low < value < parameter.high:
+                return False
+    return True
+
+
 def blank(present: Present) -> Present:
     """The effect with its amounts at zero and its shapes and settings as they are."""
     roles = [p.role for p in present.effect.parameters]
@@ -197,7 +212,7 @@ class Search:
                 self.choices[candidate.effect.label] = self._choices(candidate)
                 self._settle(trial.fit)
                 return True
-            if demand >= DEMAND:
+            if demand >= DEMAND and within_bounds(trial.fit, candidate.effect.label):
                 candidate, trial = self._best_of_tied(fit, candidate, trial)
                 demand = self.best.criterion - trial.criterion
                 self._record(candidate, trial, demand, trials[at + 1 :])
@@ -276,6 +291,10 @@ class Search:
         fit = self.fitter.with_effects(self.best.fit, effects)
         self._settle(fit)
         return self.best.fit
+
+    def go_on_from(self, fit: JointFit) -> None:
+        """Go on from another fit of the same effects."""
+        self._settle(fit)
 
     def take_in(self, candidate: Candidate, fit: JointFit) -> None:
         """Go on from a fit with one more effect, which is no name."""

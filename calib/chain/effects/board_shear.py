@@ -19,8 +19,8 @@ EFFECT = Effect(
     equation="x = x + shear * y; y = (1 + aspect) * y",
     source="affine printer error",
     parameters=(
-        Parameter("shear", "1", 1e-3, -0.1, 0.1),
-        Parameter("aspect", "1", 1e-3, -0.1, 0.1),
+        Parameter("shear", "1", 1e-3, -0.02, 0.02),
+        Parameter("aspect", "1", 1e-3, -0.02, 0.02),
     ),
     act=_act,
     seen_without_robot=True,

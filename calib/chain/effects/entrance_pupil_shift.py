@@ -17,7 +17,7 @@ EFFECT = Effect(
     physics="The lens has no single centre: rays from the field's edge enter at another depth.",
     equation="Z' = Z + pupil_m_rad2 * theta^2",
     source="Kumar, Ahuja 2015, On the equivalence of moving entrance pupil and radial distortion",
-    parameters=(Parameter("pupil_m_rad2", "m/rad^2", 3e-3, -0.1, 0.1),),
+    parameters=(Parameter("pupil_m_rad2", "m/rad^2", 3e-3, -0.03, 0.03),),
     act=_act,
     seen_without_robot=True,
     confounded_with=("protective_window", "distance_dependent_distortion"),

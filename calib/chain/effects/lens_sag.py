@@ -19,7 +19,7 @@ EFFECT = Effect(
     physics="The lens or the image stabiliser sags, so the principal point follows gravity.",
     equation="(u0, v0) = (u0, v0) + px_per_g * (gravity direction along the sensor's axes)",
     source="Shortis, Robson, Beyer 1998 (principal point against camera roll)",
-    parameters=(Parameter("px_per_g", "px/g", 1.5, -100.0, 100.0),),
+    parameters=(Parameter("px_per_g", "px/g", 1.5, -20.0, 20.0),),
     act=_act,
     confounded_with=("mount_flex",),
     acts_along=(("principal_point", "gravity"),),

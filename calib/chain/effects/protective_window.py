@@ -17,7 +17,7 @@ EFFECT = Effect(
     physics="A flat window in front of the lens shifts oblique rays.",
     equation="Z' = Z - t (1 - cos(theta) / sqrt(n^2 - sin^2(theta))), n = 1.5",
     source="Snell's law for a plane-parallel plate (Born & Wolf, section 4.7)",
-    parameters=(Parameter("thickness_m", "m", 3e-3, -0.1, 0.1),),
+    parameters=(Parameter("thickness_m", "m", 3e-3, 0.0, 0.02),),
     act=_act,
     seen_without_robot=True,
     confounded_with=("entrance_pupil_shift", "distance_dependent_distortion"),

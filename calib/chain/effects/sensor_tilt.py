@@ -19,8 +19,8 @@ EFFECT = Effect(
     equation="tilted-sensor homography with angles tilt_x_rad, tilt_y_rad",
     source="Scheimpflug model as in OpenCV's calib3d documentation (Louhichi et al. 2007)",
     parameters=(
-        Parameter("tilt_x_rad", "rad", 5e-3, -0.2, 0.2),
-        Parameter("tilt_y_rad", "rad", 5e-3, -0.2, 0.2),
+        Parameter("tilt_x_rad", "rad", 5e-3, -0.09, 0.09),
+        Parameter("tilt_y_rad", "rad", 5e-3, -0.09, 0.09),
     ),
     act=_act,
     seen_without_robot=True,

@@ -57,17 +57,20 @@ class CrossValidation:
 
     def without(self, effect: int) -> Worth:
         """What the effect of that index in the fit's model is worth."""
-        mine = [
-            (k, u.place[2])
-            for k, u in enumerate(self.fit.unknowns)
-            if u.place[0] == "effect" and u.place[1] == effect
-        ]
-        present = self.fit.model.effects[effect]
-        zero = [
-            -present.values[p] if present.effect.parameters[p].role == "amount" else 0.0
-            for _, p in mine
-        ]
-        lost = self._lost(np.array([k for k, _ in mine], dtype=np.int64), np.array(zero))
+        numbers = range(len(self.fit.model.effects[effect].values))
+        return self.without_numbers({(effect, k) for k in numbers})
+
+    def without_numbers(self, numbers: set[tuple[int, int]]) -> Worth:
+        """What some fitted numbers, (effect, place) each, are worth; shapes stay as they are."""
+        mine, zero = [], []
+        for k, unknown in enumerate(self.fit.unknowns):
+            kind, effect, place = unknown.place
+            if kind == "effect" and (effect, place) in numbers:
+                present = self.fit.model.effects[effect]
+                amount = present.effect.parameters[place].role == "amount"
+                mine.append(k)
+                zero.append(-present.values[place] if amount else 0.0)
+        lost = self._lost(np.array(mine, dtype=np.int64), np.array(zero))
         return Worth(lost[0] - self.whole[0], lost[1] - self.whole[1])
 
     def _lost(self, held: NDArray[np.int64], at: FloatArray) -> tuple[float, float]:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
+from calib.chain.effect import Present
+from calib.chain.effects import catalogue
 from calib.chain.empirical import UNNAMED
 from calib.discovery.laws.contest import Tried, as_cell, fitted, promising
 from calib.discovery.laws.cross_validation import CrossValidation
 from calib.discovery.laws.frames import frame_blocks
 from calib.discovery.locate import Cell
-from calib.discovery.score import score_effects
-from calib.discovery.search import Search, blank
+from calib.discovery.score import Score, bic, conditional, extended, group_score, score_effects
+from calib.discovery.search import DEMAND, Search, blank
+from calib.solver.joint import JointFit
+from calib.views import Views
 
 _AS_GOOD = 0.8
 """A law whose score test promises this share of what the name's does is worth a fit."""
@@ -41,6 +49,63 @@ def _put_in(search: Search, tried: list[Tried], label: str) -> Cell:
     search.take_in(tried[0].candidate, tried[0].trial.fit)
     search.run()
     return cell
+
+
+_KINEMATIC = ("link_geometry", "joint_zero_offset")
+
+
+def drop_beside_kinematics(search: Search) -> None:
+    """Drop names that are not demanded once all the arm's kinematic numbers may be a little off.
+
+    A controller's factory calibration moves every length, twist and offset; of these the search
+    frees but the few that it sees, and what the others leave looks like a scale, or a slip.
+    """
+    if not any(p.effect.name in _KINEMATIC for p in search.best.fit.model.effects):
+        return
+    dropped = False
+    for present in search.best.fit.model.effects:
+        if present.effect.name in _KINEMATIC or present.effect.seen_without_robot:
+            continue
+        _, without = search.missed(present)
+        score = _beside_kinematics(without, search.views, blank(present))
+        if bic(score.gain, score.columns, search.views) < DEMAND:
+            search.leave_out(present)
+            dropped = True
+    if dropped:
+        _free_kinematics(search)
+
+
+def _free_kinematics(search: Search) -> None:
+    """Free every kinematic number of those named, where left-out frames are better for it."""
+    fit = search.best.fit
+    freed = tuple(
+        replace(p, held=frozenset()) if p.effect.name in _KINEMATIC else p
+        for p in fit.model.effects
+    )
+    whole = search.fitter.with_effects(fit, freed)
+    more = {
+        (k, place)
+        for k, (before, after) in enumerate(zip(fit.model.effects, freed, strict=True))
+        for place in set(after.free) - set(before.free)
+    }
+    checked = CrossValidation(whole, frame_blocks(whole, search.views))
+    if checked.without_numbers(more).supported:
+        search.go_on_from(whole)
+
+
+def _beside_kinematics(fit: JointFit, views: Views, present: Present) -> Score:
+    """What an effect would gain beside every kinematic number of the arm, freed."""
+    known = {p.effect.label: set(p.free) for p in fit.model.effects}
+    background = [
+        Present(effect, effect.values({}), frozenset(known.get(effect.label, ())))
+        for effect in catalogue()
+        if effect.name in _KINEMATIC
+    ]
+    equations, _, unknowns, _ = extended(fit, views, (present, *background))
+    first = len(fit.model.effects)
+    mine = np.array([k for k, u in enumerate(unknowns) if u.place[:2] == ("effect", first)])
+    information, gradient = conditional(equations, fit, mine)
+    return group_score(information, gradient, views)
 
 
 def drop_unsupported(search: Search) -> None:
