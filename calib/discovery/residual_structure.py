@@ -63,7 +63,7 @@ def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> Res
     search.drop_on_joints({cell.site for cell in found})
     search.drop_beside_curves()
     drop_beside_kinematics(search)
-    drop_unsupported(search)
+    drop_unsupported(search, beside_field=any(cell.is_field for cell in found))
     present = {p.effect.label for p in search.best.fit.model.effects}
     kept = [cell for cell in found if cell.law is None or cell.law.effect.label in present]
     return ResidualStructure(search, known + tuple(kept))

@@ -108,13 +108,25 @@ def _beside_kinematics(fit: JointFit, views: Views, present: Present) -> Score:
     return group_score(information, gradient, views)
 
 
-def drop_unsupported(search: Search) -> None:
-    """Drop every effect, named or not, that frames left out of the fit are better without."""
+def drop_unsupported(search: Search, *, beside_field: bool = False) -> None:
+    """Drop every effect, named or not, that frames left out of the fit are better without.
+
+    `beside_field`: a field of shifts is left, whose edges a lens effect fits without being there;
+    its name then has to place the left-out corners better, too.
+    """
     while search.best.fit.model.effects:
         fit = search.best.fit
         checked = CrossValidation(fit, frame_blocks(fit, search.views))
-        worth = [checked.without(k).minus_two_log for k in range(len(fit.model.effects))]
-        least = worth.index(min(worth))
-        if worth[least] > 0.0:
+        worth = [checked.without(k) for k in range(len(fit.model.effects))]
+        lowest = [
+            min(w.minus_two_log, w.gain_px) if beside_field and _in_camera(p) else w.minus_two_log
+            for w, p in zip(worth, fit.model.effects, strict=True)
+        ]
+        least = lowest.index(min(lowest))
+        if lowest[least] > 0.0:
             return
         search.leave_out(fit.model.effects[least])
+
+
+def _in_camera(present: Present) -> bool:
+    return present.effect.link in ("lens", "sensor") and present.effect.seen_without_robot

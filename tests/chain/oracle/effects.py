@@ -186,6 +186,18 @@ def _(p: Numbers, scene: Scene) -> None:
     scene.points = scene.points + anp.outer(height, np.array([0.0, 0.0, 1.0]))
 
 
+@_of("board_warp:free")
+def _(p: Numbers, scene: Scene) -> None:
+    board = scene.views.board
+    size = board.square_m * np.array([board.cols - 1, board.rows - 1])
+    x, y = anp.transpose(np.pi * scene.points[:, :2] / size)
+    height = 0.0 * x
+    for name, amount in p.items():
+        _, i, j, _ = name.split("_")
+        height = height + amount * anp.cos(int(i) * x) * anp.cos(int(j) * y)
+    scene.points = scene.points + anp.outer(height, np.array([0.0, 0.0, 1.0]))
+
+
 @_of("focus_breathing:inverse_square")
 def _(p: Numbers, scene: Scene) -> None:
     _scale_focal(scene, 1.0 - p["k_px_m2"] / (scene.focused**2 * scene.optics["alpha_px"]))
