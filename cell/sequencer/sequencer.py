@@ -36,7 +36,7 @@ from cell.storage.files.plan_file import Plan
 from cell.storage.recording import RecordingWriter
 from drivers.arm import Arm, ArmState
 from drivers.camera import Camera, FocusSetting, Frame
-from drivers.errors import FrameLost, StopFailed
+from drivers.errors import FrameLost
 
 _LAST_FRAME_S = 30.0
 
@@ -124,7 +124,9 @@ class Sequencer:
             self._connect()
             self._take_views()
         except BaseException as fault:
-            error = self._arm.stop(fault)
+            error = fault
+        error = self._stop_arm(error)
+        if error is not None:
             self._tell(State.STOPPING)
             with suppress(DiskFailed):
                 self._keep_the_frame_in_hand()
@@ -144,6 +146,13 @@ class Sequencer:
             dict(progress.detections),
             "" if error else self._ended_early,
         )
+
+    def _stop_arm(self, fault: BaseException | None) -> BaseException | None:
+        """Stop the arm, at a fault or at the end; returns what the operator is told first."""
+        error, word = self._arm.stop(fault)
+        if word is not None:
+            self._note("halt", **vars(word))
+        return error
 
     # -- one view after the other ------------------------------------------------------------
 
@@ -293,10 +302,8 @@ class Sequencer:
 
     def _reopen_camera(self, index: int, lost: CameraLost) -> None:
         """Stop the arm, then open the camera anew; raises `DeviceError` where it stays away."""
-        try:
-            self._arm.arm.stop()
-        except StopFailed:
-            raise lost from None  # the run ends, which stops the arm again and says what failed
+        if not self._arm.halt().stands:
+            raise lost from None  # the run ends, which stops the arm again and says what is known
         self._journal.write("camera lost", view=index, reason=str(lost))
         name = self._plan.view_name(index)
         self._tell(self._state, f"{name}: {lost}; opening the camera once more")

@@ -14,7 +14,9 @@ import numpy as np
 from calib.views import FloatArray
 from cell.errors import StoppedByOperator
 from cell.sequencer.clock import Clock
+from cell.sequencer.confirmed_stop import ConfirmedStop, StopWord
 from cell.sequencer.guard import Guard
+from cell.sequencer.rest import fastest_rad_s
 from cell.sequencer.stop import StopRequest
 from cell.storage.files.plan_file import Settle
 from drivers.arm import Arm, ArmState, Motion
@@ -22,10 +24,10 @@ from drivers.errors import ArmStopped, DeviceError, StopFailed
 
 POLL_S = 0.008
 READING_PATIENCE_S = 1.0
-STOP_ORDERS = 3
 _ARRIVED_RAD = 0.02
 _MOVE_PATIENCE = 3.0
 _MOVE_SLACK_S = 15.0
+_UNDERWAY_RAD, _UNDERWAY_RAD_S = 1e-4, 0.05
 
 Result = TypeVar("Result")
 
@@ -41,7 +43,7 @@ class WatchedArm:
     stop_request:
         Looked at in every wait.
     on_reading:
-        LayoutDoubt of every reading; must not raise or block.
+        Told of every reading; must not raise or block.
     connected:
         Whether `connect` succeeded: from then on every fault stops the arm.
     """
@@ -52,6 +54,9 @@ class WatchedArm:
     stop_request: StopRequest
     on_reading: Callable[[ArmState], None] = lambda state: None
     connected: bool = field(default=False, init=False)
+    _newest: ArmState | None = field(default=None, init=False)
+    _previous: ArmState | None = field(default=None, init=False)
+    _goal_rad: FloatArray | None = field(default=None, init=False)
 
     def connect(self) -> FloatArray:
         """Open the link; returns the (6,) joint angles the arm stands at."""
@@ -73,9 +78,27 @@ class WatchedArm:
             raise StoppedByOperator(f"stopped by {self.stop_request.reason}")
         state = self.arm.state()
         self.on_reading(state)
+        self._remember(state)
         if state.motion is Motion.STOPPED_BY_FAULT:
             raise ArmStopped(state.fault or "the arm stopped by itself and does not say why")
         return state
+
+    def _remember(self, state: ArmState) -> None:
+        if self._newest is None or state.host_t_s > self._newest.host_t_s:
+            self._previous, self._newest = self._newest, state
+
+    def _is_underway(self) -> bool:
+        """Whether the newest reading is one from the way, so that the arm cannot stand there."""
+        newest, previous, goal = self._newest, self._previous, self._goal_rad
+        if newest is None or newest.joints_rad is None:
+            return False
+        if newest.joint_velocity_rad_s is not None:
+            return fastest_rad_s(newest) > _UNDERWAY_RAD_S
+        if previous is None or previous.joints_rad is None or goal is None:
+            return False
+        moved_rad = np.abs(np.subtract(newest.joints_rad, previous.joints_rad)).max()
+        left_rad = np.abs(np.subtract(newest.joints_rad, goal)).max()
+        return bool(moved_rad > _UNDERWAY_RAD and left_rad > _ARRIVED_RAD)
 
     def await_job(self, job: Future[Result], states: list[ArmState] | None = None) -> Result:
         """A job's result, the arm being watched meanwhile; its readings go to `states`."""
@@ -111,6 +134,7 @@ class WatchedArm:
         here = joints_of(self.watch())
         target = self.guard.target(here, there, where)
         ordered_s = self.clock.now()
+        self._goal_rad = there
         self.arm.start_move(target)
         patience_s = _MOVE_PATIENCE * self.guard.move_time_s(here, there) + _MOVE_SLACK_S
         while True:
@@ -144,23 +168,31 @@ class WatchedArm:
                 )
             self.clock.sleep(POLL_S)
 
-    def stop(self, fault: BaseException) -> BaseException:
-        """Stop the arm before all else; returns what the operator must be told first."""
-        failure: Exception | None = None
-        for _ in range(STOP_ORDERS if self.connected else 0):
-            try:
-                self.arm.stop()
-            except Exception as refusal:
-                failure = refusal
-            else:
-                return fault
-        if failure is None:
-            return fault
-        text = f"THE ARM DID NOT CONFIRM ITS STOP ({failure}). PRESS THE EMERGENCY STOP NOW."
+    def halt(self) -> StopWord:
+        """Stop the arm; returns what readings say of it afterwards."""
+        stop = ConfirmedStop(self.arm, self.clock, self.on_reading)
+        word = stop.see_through(self._newest, underway=self._is_underway())
+        self._goal_rad = None
+        return word
+
+    def stop(self, fault: BaseException | None) -> tuple[BaseException | None, StopWord | None]:
+        """Stop the arm before all else, at a fault or at the end of a run.
+
+        Returns
+        -------
+        What the operator must be told first, and the word of the stop; None for an arm that was
+        never reached.
+        """
+        if not self.connected:
+            return fault, None
+        word = self.halt()
+        if word.stands:
+            return fault, word
         with suppress(OSError):  # a terminal that is gone must not hide the rest
-            sys.stderr.write(f"\a\n*** {text} ***\n")
+            sys.stderr.write(f"\a\n*** {word.text} ***\n")
             sys.stderr.flush()
-        return StopFailed(f"{text} It was to be stopped because: {fault}")
+        because = "the run was over" if fault is None else str(fault) or type(fault).__name__
+        return StopFailed(f"{word.text} It was to be stopped because: {because}"), word
 
 
 def joints_of(state: ArmState) -> FloatArray:

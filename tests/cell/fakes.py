@@ -12,6 +12,8 @@ from calib.chain.kinematics import arm
 from drivers.arm import ArmState, Motion, MoveTarget
 from drivers.camera import FocusSetting, Frame
 
+BRAKE_S = 0.02
+"""From the order to the halt: no arm stands where it was when it was told to stop."""
 HOME = np.radians([0, -90, 90, -90, -90, 0])
 
 
@@ -43,6 +45,9 @@ class FakeArm:
         self.stop_error: Exception | None = None
         self.drift_rad = 0.0
         self.tells_every_s = 0.0
+        self.obeys_after_s = 0.0
+        """From the first order to the brake; inf for an arm that takes it and drives on."""
+        self.brakes_s = np.inf
 
     def connect(self) -> None:
         self.calls.append("connect")
@@ -54,11 +59,12 @@ class FakeArm:
 
     @property
     def share(self) -> float:
-        return min(1.0, (self.now() - self.began_s) / self.takes_s) if self.takes_s else 1.0
+        now_s = min(self.now(), self.brakes_s)
+        return min(1.0, (now_s - self.began_s) / self.takes_s) if self.takes_s else 1.0
 
     @property
     def moving(self) -> bool:
-        return self.share < 1.0
+        return self.share < 1.0 and self.now() < self.brakes_s
 
     def state(self) -> ArmState:
         joints = self.start + self.share * (self.end - self.start) + self.drift_rad
@@ -75,7 +81,9 @@ class FakeArm:
 
     def start_move(self, target: MoveTarget) -> None:
         self.calls.append("move")
-        self.start, self.end = self.end, np.array(target.joints_rad)
+        self.start = self.start + self.share * (self.end - self.start)
+        self.end = np.array(target.joints_rad)
+        self.brakes_s = np.inf
         self.began_s = self.now()
         self.takes_s = float(np.abs(self.end - self.start).max()) / target.joint_speed_rad_s
 
@@ -84,8 +92,7 @@ class FakeArm:
         if self.stop_error is not None:
             raise self.stop_error
         self.stopped_s = self.stopped_s or self.now()
-        self.start = self.end = self.start + self.share * (self.end - self.start)
-        self.takes_s = 0.0
+        self.brakes_s = min(self.brakes_s, self.now() + self.obeys_after_s + BRAKE_S)
 
     def close(self) -> None:
         self.calls.append("close")
