@@ -17,6 +17,8 @@ from benchmarks.fault_runs.stands import Stand
 Act = Callable[[Stand, Launch], None]
 _DEVICE, _OPERATOR, _SAFETY, _KILLED = 3, 4, 5, -signal.SIGKILL
 RESUMES = r"--resume"
+_NOBODY_KNOWS = ("NOBODY KNOWS WHETHER THE ARM STANDS", "PRESS THE EMERGENCY STOP", RESUMES)
+"""Without a reading there is no word of the stop."""
 _CONNECTING_S, _MOVING_S = 0.8, 4.2
 
 
@@ -196,14 +198,16 @@ _UR = (
     Fault(
         "controller mute",
         _mute,
-        words=("silent|did not answer|does not answer", "[Cc]heck", RESUMES),
+        exits=(_SAFETY,),
+        words=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
         halt_s=1.0,
         restore=_restore_arm,
     ),
     Fault(
         "cable cut",
         lambda stand, _: stand.arm.cut(),
-        words=("silent|did not answer|does not answer", "[Cc]heck", RESUMES),
+        exits=(_SAFETY,),
+        words=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
         halt_s=1.0,
         restore=_restore_arm,
     ),
@@ -217,8 +221,8 @@ _UR = (
     Fault(
         "controller dies",
         lambda stand, _: stand.arm.kill(),
-        exits=(_DEVICE, _SAFETY),
-        words=("emergency stop|EMERGENCY STOP|[Cc]heck", RESUMES),
+        exits=(_SAFETY,),
+        words=_NOBODY_KNOWS,
         halt_s=0.6,
         restore=_revive_arm,
     ),
@@ -338,16 +342,16 @@ _ABB = (
     Fault(
         "cable cut",
         lambda stand, _: stand.arm.cut(),
-        exits=(_DEVICE, _SAFETY),
-        words=("emergency stop|EMERGENCY STOP|[Cc]heck", RESUMES),
+        exits=(_SAFETY,),
+        words=_NOBODY_KNOWS,
         halt_s=1.5,
         restore=_restore_arm,
     ),
     Fault(
         "controller dies",
         lambda stand, _: stand.arm.kill(),
-        exits=(_DEVICE, _SAFETY),
-        words=("emergency stop|EMERGENCY STOP|[Cc]heck", RESUMES),
+        exits=(_SAFETY,),
+        words=_NOBODY_KNOWS,
         halt_s=0.6,
         restore=_revive_arm,
     ),

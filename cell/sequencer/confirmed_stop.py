@@ -58,17 +58,19 @@ class ConfirmedStop:
     ) -> None:
         self._arm, self._clock, self._on_reading = arm, clock, on_reading
 
-    def see_through(self, before: ArmState | None = None, *, underway: bool = False) -> StopWord:
+    def see_through(
+        self, before: ArmState | None = None, *, least_way_rad: float = -1.0
+    ) -> StopWord:
         """Order the stop, again and again, until readings prove it or `DEADLINE_S` has passed.
 
         Parameters
         ----------
-        before, underway:
-            The newest reading from before, and whether the arm was on its way in it: see
+        before, least_way_rad:
+            The newest reading from before, and how far the arm has gone since, at least: see
             `RestEvidence`.
         """
         began_s = due_s = self._clock.now()
-        evidence = RestEvidence(began_s, before, underway=underway)
+        evidence = RestEvidence(began_s, before, least_way_rad)
         orders, refusal = 0, ""
         while True:
             now_s = self._clock.now()

@@ -22,8 +22,9 @@ class RestEvidence:
         Host time of the order; what was read before it proves nothing.
     before:
         The newest reading from before, None where there was none.
-    underway:
-        Whether the arm was on its way, far from its target, in `before`.
+    least_way_rad:
+        The arm was on its way in `before`, and must have gone farther than this since; below
+        zero where it may stand where it was.
 
     Attributes
     ----------
@@ -33,10 +34,10 @@ class RestEvidence:
         Whether the newest reading was a fresh one, which told of motion or of rest.
     """
 
-    def __init__(self, ordered_s: float, before: ArmState | None, *, underway: bool) -> None:
+    def __init__(self, ordered_s: float, before: ArmState | None, least_way_rad: float) -> None:
         self._ordered_s = ordered_s
-        self._newest = before
-        self._stale = _joints(before) if before is not None and underway else None
+        self._newest = self._before = before
+        self._least_way_rad = least_way_rad
         self._anchor: ArmState | None = None
         self.missing = "no reading has come since the order"
         self.fresh = False
@@ -77,12 +78,12 @@ class RestEvidence:
 
     def _doubt(self, state: ArmState) -> str | None:
         """Why a reading proves nothing, None where it may."""
-        joints, newest = _joints(state), self._newest
-        if joints is None or not np.isfinite(state.base_from_flange.as_matrix()).all():
+        newest, before = self._newest, self._before
+        if _joints(state) is None or not np.isfinite(state.base_from_flange.as_matrix()).all():
             return "its readings are not finite"
         if newest is not None and not _clock_goes_on(newest, state):
             return "the controller's clock stands still, so that its readings may be old"
-        if self._stale is not None and np.array_equal(joints, self._stale):
+        if before is not None and _apart(before, state) <= self._least_way_rad:
             return "its readings are what they were when it was on its way, so they are old"
         return None
 
@@ -119,4 +120,4 @@ def _elapsed_s(first: ArmState, last: ArmState) -> float:
 
 
 def _apart(a: ArmState, b: ArmState) -> float:
-    return float(np.abs(np.subtract(a.joints_rad, b.joints_rad)).max())
+    return float(np.abs(np.subtract(a.joints_rad or (), b.joints_rad or ())).max(initial=0.0))

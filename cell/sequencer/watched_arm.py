@@ -27,7 +27,7 @@ READING_PATIENCE_S = 1.0
 _ARRIVED_RAD = 0.02
 _MOVE_PATIENCE = 3.0
 _MOVE_SLACK_S = 15.0
-_UNDERWAY_RAD, _UNDERWAY_RAD_S = 1e-4, 0.05
+_UNDERWAY_RAD_S, _SURE_SHARE = 0.02, 0.3
 
 Result = TypeVar("Result")
 
@@ -79,7 +79,7 @@ class WatchedArm:
         state = self.arm.state()
         self.on_reading(state)
         self._remember(state)
-        if state.motion is Motion.STOPPED_BY_FAULT:
+        if state.motion is Motion.STOPPED_BY_FAULT or state.fault is not None:
             raise ArmStopped(state.fault or "the arm stopped by itself and does not say why")
         return state
 
@@ -87,18 +87,30 @@ class WatchedArm:
         if self._newest is None or state.host_t_s > self._newest.host_t_s:
             self._previous, self._newest = self._newest, state
 
-    def _is_underway(self) -> bool:
-        """Whether the newest reading is one from the way, so that the arm cannot stand there."""
-        newest, previous, goal = self._newest, self._previous, self._goal_rad
-        if newest is None or newest.joints_rad is None:
-            return False
+    def _least_way_rad(self, *, undisturbed: bool) -> float:
+        """How far the arm must have gone since the newest reading; below 0 where it may not have.
+
+        `undisturbed`: nothing but the order that follows can have stopped it.
+        """
+        newest, goal = self._newest, self._goal_rad
+        if newest is None or newest.joints_rad is None or goal is None:
+            return -1.0
+        speed_rad_s = self._speed_rad_s(newest)
+        left_rad = float(np.abs(np.subtract(newest.joints_rad, goal)).max())
+        if not (speed_rad_s > _UNDERWAY_RAD_S and left_rad > _ARRIVED_RAD):
+            return -1.0
+        age_s = self.clock.now() - newest.host_t_s
+        return _SURE_SHARE * speed_rad_s * max(age_s, 0.0) if undisturbed else 0.0
+
+    def _speed_rad_s(self, newest: ArmState) -> float:
+        """Of the fastest joint, as the controller tells it or as its readings do."""
+        previous = self._previous
         if newest.joint_velocity_rad_s is not None:
-            return fastest_rad_s(newest) > _UNDERWAY_RAD_S
-        if previous is None or previous.joints_rad is None or goal is None:
-            return False
-        moved_rad = np.abs(np.subtract(newest.joints_rad, previous.joints_rad)).max()
-        left_rad = np.abs(np.subtract(newest.joints_rad, goal)).max()
-        return bool(moved_rad > _UNDERWAY_RAD and left_rad > _ARRIVED_RAD)
+            return fastest_rad_s(newest)
+        if previous is None or previous.joints_rad is None:
+            return 0.0
+        moved_rad = np.abs(np.subtract(newest.joints_rad or (), previous.joints_rad)).max()
+        return float(moved_rad) / (newest.host_t_s - previous.host_t_s)
 
     def await_job(self, job: Future[Result], states: list[ArmState] | None = None) -> Result:
         """A job's result, the arm being watched meanwhile; its readings go to `states`."""
@@ -168,10 +180,14 @@ class WatchedArm:
                 )
             self.clock.sleep(POLL_S)
 
-    def halt(self) -> StopWord:
-        """Stop the arm; returns what readings say of it afterwards."""
+    def halt(self, *, undisturbed: bool = False) -> StopWord:
+        """Stop the arm; returns what readings say of it afterwards.
+
+        `undisturbed`: nothing can have stopped it before.
+        """
         stop = ConfirmedStop(self.arm, self.clock, self.on_reading)
-        word = stop.see_through(self._newest, underway=self._is_underway())
+        least_way_rad = self._least_way_rad(undisturbed=undisturbed)
+        word = stop.see_through(self._newest, least_way_rad=least_way_rad)
         self._goal_rad = None
         return word
 
@@ -185,7 +201,7 @@ class WatchedArm:
         """
         if not self.connected:
             return fault, None
-        word = self.halt()
+        word = self.halt(undisturbed=isinstance(fault, StoppedByOperator))
         if word.stands:
             return fault, word
         with suppress(OSError):  # a terminal that is gone must not hide the rest

@@ -64,11 +64,9 @@ class ABBArm:
     def state(self) -> ArmState:
         """Return the newest reading: EGM's while a program runs and it comes, else RWS's.
 
-        Raises `DeviceUnreachable` when it is stale, `StopFailed` when a stop was not confirmed.
+        Raises `DeviceUnreachable` when it is stale.
         """
         supervisor = self._connected()
-        if supervisor.stop_failed is not None:
-            raise StopFailed(self._named(f"{supervisor.stop_failed}. Press the emergency stop"))
         reading = self._reading(supervisor)
         return ArmState(
             host_t_s=reading.host_t_s,
@@ -77,7 +75,7 @@ class ABBArm:
             joint_velocity_rad_s=None,
             base_from_flange=reading.base_from_flange,
             motion=_motion(supervisor),
-            fault=supervisor.fault,
+            fault=supervisor.fault or supervisor.stop_failed,
             raw=reading.raw,
         )
 

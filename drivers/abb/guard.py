@@ -2,8 +2,8 @@
 
 An IRC5 has no watchdog on Robot Web Services: a motion program goes on to its end, whoever sent
 it. The process holds a session of its own. Every line on its standard input, and the end of it,
-makes it stop RAPID and, should the controller refuse, switch the motors off. It is run by path and
-stands alone.
+makes it stop RAPID and, should the controller refuse or the line say so, switch the motors off. It
+is run by path and stands alone.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 
 _TRIES = 3
 _NO_CONTENT, _REFUSED = 204, 300
+STOP, MOTORS_OFF = "stop", "motors off"
 _ORDERS = (
     ("rw/rapid/execution?action=stop", {"stopmode": "stop"}),
     ("rw/panel/ctrlstate?action=setctrlstate", {"ctrl-state": "motoroff"}),
@@ -95,15 +96,18 @@ class StopSession:
         """Make the first request, which costs the challenge; raises `OSError`."""
         self._ask("GET", f"{self._url}/rw/rapid/execution?json=1")
 
-    def stop(self) -> str | None:
-        """Stop RAPID, or else the motors; return None, or why neither could be done."""
+    def stop(self, *, motors_off: bool = False) -> str | None:
+        """Stop RAPID, or else the motors; return None, or why neither could be done.
+
+        `motors_off` switches them off even where RAPID's stop was taken.
+        """
         why = ""
         for path, payload in _ORDERS:
             refusal = self._post(path, payload)
-            if refusal is None:
+            if refusal is None and not motors_off:
                 return None
-            why = refusal
-        return why
+            why = refusal or ""
+        return why or None
 
     def _post(self, path: str, payload: dict[str, str]) -> str | None:
         why = ""
@@ -138,8 +142,8 @@ def main() -> None:
     session = StopSession(**options)
     session.log_in()
     print("ready", flush=True)
-    for _ in sys.stdin:
-        session.stop()
+    for line in sys.stdin:
+        session.stop(motors_off=line.strip() == MOTORS_OFF)
     session.stop()
 
 

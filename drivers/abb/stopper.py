@@ -14,7 +14,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from drivers.abb.guard import StopSession
+from drivers.abb.guard import MOTORS_OFF, STOP, StopSession
 from drivers.abb.rws import login_in
 from drivers.abb.settings import ABBSettings
 from drivers.errors import DeviceUnreachable
@@ -50,7 +50,7 @@ class Stopper:
         self._guard: subprocess.Popen[str] | None = None
         self._asked = threading.Event()
         self._answered = threading.Event()
-        self._closing = False
+        self._closing = self._motors_off = False
         self.failure: str | None = None
         self._thread = threading.Thread(target=self._serve, name="abb-stop", daemon=True)
 
@@ -73,11 +73,15 @@ class Stopper:
         self._await_guard(self._guard)
         self._thread.start()
 
-    def order(self) -> bool:
-        """Send the stop on both ways; return whether the answer came at once, see `failure`."""
+    def order(self, *, motors_off: bool = False) -> bool:
+        """Send the stop on both ways; return whether the answer came at once, see `failure`.
+
+        `motors_off` switches the motors off, too; somebody must then switch them on again.
+        """
         self.failure = None
         self._answered.clear()
-        self._tell_guard("stop")
+        self._motors_off = motors_off
+        self._tell_guard(MOTORS_OFF if motors_off else STOP)
         self._asked.set()
         return self._answered.wait(_ANSWER_S)
 
@@ -94,7 +98,7 @@ class Stopper:
         while not self._closing:
             self._asked.wait()
             self._asked.clear()
-            self.failure = self._session.stop()
+            self.failure = self._session.stop(motors_off=self._motors_off)
             self._answered.set()
 
     def _await_guard(self, guard: subprocess.Popen[str]) -> None:

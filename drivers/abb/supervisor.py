@@ -5,9 +5,11 @@
     no order ── order() ──> starting ──> RAPID running ──> stopped at the target ──> no order
         │                      │              │
         └── fault, lost link, stop() ─────────┴──> stop on both ways, until RAPID has stopped
+                                                   └── not soon: motors off, too
 
-A stop that falls between the requests of a start keeps the start from being sent; one that crosses
-it on the wire is sent again.
+While a stop is not confirmed nobody vouches for the motion, so that the controller's own watch
+over the link ends it as well. A stop that falls between the requests of a start keeps the start
+from being sent; one that crosses it on the wire is sent again.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ from drivers.errors import DeviceError, DeviceUnreachable
 _AT_REST_RAD = 1e-4
 _PANEL_EVERY, _POSE_EVERY = 9, 2
 _STOP_CONFIRM_S = 2.0
+_MOTORS_OFF_S = 0.7
 _CLOSE_S = 1.0
 _START_S = 0.5  # between the answer to a start and the motion
 _START_ACTION = "rapid/execution?action=start"
@@ -115,14 +118,20 @@ class Supervisor:
     def stop(self) -> str | None:
         """Stop the arm; return why the stop was not taken, or None."""
         self._cancelled.set()
-        answered = self._stopper.order()
+        answered = self._stopper.order(motors_off=self._unheeded())
         with self._lock:
             self._order = None
-            self._stop_s = time.monotonic()
+            # one that is repeated is as old as its first order
+            self._stop_s = self._stop_s or time.monotonic()
         self._wake.set()
         if not answered and self.silent_s > self._settings.silence_s:
             return "the controller is silent"
         return self._stopper.failure
+
+    def _unheeded(self) -> bool:
+        """Whether a stop that was ordered some time ago has not been seen obeyed."""
+        since_s = self._stop_s
+        return since_s is not None and time.monotonic() - since_s > _MOTORS_OFF_S
 
     def close(self) -> None:
         """Stop the arm and end the thread."""
@@ -197,7 +206,7 @@ class Supervisor:
     def _vouch(self) -> None:
         if self._order is None and self._still:
             self._watch.end()
-        else:
+        elif self._stop_s is None:
             self._watch.beat()
 
     def _take(self, reading: Reading) -> None:
@@ -212,7 +221,7 @@ class Supervisor:
             stop_again = self._stop_pending()
             off = self._end_order()
         if stop_again:
-            self._stopper.order()
+            self._stopper.order(motors_off=self._unheeded())
         if off is not None:
             self._trip(self._reason(off))
 

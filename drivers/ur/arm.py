@@ -84,12 +84,11 @@ class URArm:
     def state(self) -> ArmState:
         """Return the newest packet, with the flange's pose freed of the tool offset.
 
-        Raises `DeviceUnreachable` when it is stale, `StopFailed` when a stop was not confirmed.
+        Raises `DeviceUnreachable` when it is stale. A link that was lost is tried again, so that a
+        reading can tell whether the arm stands; the loss stays a fault until `connect`.
         """
         packet = self._reader.newest()
         supervisor = self._connected()
-        if supervisor.stop_failed is not None:
-            raise StopFailed(self._named(f"{supervisor.stop_failed}. Press the emergency stop"))
         return ArmState(
             host_t_s=packet.host_t_s,
             controller_t_s=packet.number("timestamp"),
@@ -99,7 +98,7 @@ class URArm:
                 packet.vector("actual_TCP_pose"), packet.vector("tcp_offset")
             ),
             motion=_motion(supervisor, packet),
-            fault=supervisor.why(),
+            fault=supervisor.why() or supervisor.stop_failed,
             raw=self._raw(packet),
         )
 
@@ -124,12 +123,12 @@ class URArm:
         supervisor.order(self._order(target, packet))
 
     def stop(self) -> None:
-        """Stop on two paths that do not pass through ur-rtde; see `drivers.ur.stop_paths`."""
+        """Stop on paths that do not pass through ur-rtde; see `drivers.ur.stop_paths`."""
         supervisor = self._supervisor
         if supervisor is not None and not supervisor.stop():
             raise StopFailed(
                 self._named(
-                    "neither the dashboard nor the script port took the stop. The controller's "
+                    "neither the dashboard nor a script port took the stop. The controller's "
                     "watchdog should have stopped the arm; make sure, at the emergency stop"
                 )
             )

@@ -31,6 +31,9 @@ OUTPUTS = [
 ]
 
 
+_REOPEN_S, _REOPEN_PAUSE_S = 0.5, 0.05
+
+
 @dataclass(frozen=True)
 class Packet:
     """One cycle of the controller; every value is of the same instant.
@@ -70,7 +73,7 @@ class RtdeReader:
         Packets a second to ask for.
     silence_s:
         Without a packet, or without the controller's clock going on, for so long, the link counts
-        as lost. It stays lost until `connect`.
+        as lost. It stays lost until `connect`, or a `reopen` that succeeds.
     """
 
     def __init__(self, host: str, *, rate_hz: float = 125.0, silence_s: float = 0.25) -> None:
@@ -83,29 +86,61 @@ class RtdeReader:
         self._lost: str | None = "not connected"
         self._fresh = threading.Condition()
         self._thread: threading.Thread | None = None
+        self._reopening: threading.Thread | None = None
+        self._closed = True
 
     def connect(self, timeout_s: float = 2.0) -> None:
         """Open, negotiate, and wait for the first packet; raises `DeviceError`."""
         self.close()
-        try:
-            deadline_s = time.monotonic() + timeout_s
-            self._link = socket.create_connection((self._host, RTDE_PORT), timeout_s)
-            recipe = self._negotiate(self._link, deadline_s)
-        except (OSError, struct.error) as error:
-            self.close()
-            raise DeviceUnreachable(
-                f"UR controller {self._host}: RTDE port {RTDE_PORT} does not answer ({error}). "
-                "Check power, cable and address"
-            ) from None
-        self._lost = None
-        self._newest = None
-        self._advanced_s = time.monotonic()
-        self._thread = threading.Thread(
-            target=self._read, args=(self._link, recipe), name="ur-rtde-reader", daemon=True
-        )
-        self._thread.start()
+        self._closed = False
+        self._open(timeout_s)
         self._await(lambda: self._newest is not None, timeout_s)
         self.newest()
+
+    def reopen(self) -> None:
+        """Try a lost link again, in a thread of its own; nothing happens while one is at it."""
+        trying = self._reopening is not None and self._reopening.is_alive()
+        if self._lost is None or self._closed or trying:
+            return
+        self._reopening = threading.Thread(
+            target=self._try_again, name="ur-rtde-reopen", daemon=True
+        )
+        self._reopening.start()
+
+    def _try_again(self) -> None:
+        with contextlib.suppress(DeviceError):
+            self._open(_REOPEN_S)
+        time.sleep(_REOPEN_PAUSE_S)
+
+    def _open(self, timeout_s: float) -> None:
+        with contextlib.ExitStack() as opened:
+            try:
+                deadline_s = time.monotonic() + timeout_s
+                link = socket.create_connection((self._host, RTDE_PORT), timeout_s)
+                opened.callback(link.close)
+                recipe = self._negotiate(link, deadline_s)
+            except (OSError, struct.error) as error:
+                raise DeviceUnreachable(
+                    f"UR controller {self._host}: RTDE port {RTDE_PORT} does not answer ({error})."
+                    " Check power, cable and address"
+                ) from None
+            self._begin(link, recipe)
+            opened.pop_all()
+
+    def _begin(self, link: socket.socket, recipe: Recipe) -> None:
+        """Read from a link that is open, unless the reader was closed meanwhile."""
+        with self._fresh:
+            if self._closed:
+                link.close()
+                return
+            if self._link is not None:
+                self._link.close()
+            self._link, self._lost, self._newest = link, None, None
+            self._advanced_s = time.monotonic()
+            self._thread = threading.Thread(
+                target=self._read, args=(link, recipe), name="ur-rtde-reader", daemon=True
+            )
+            self._thread.start()
 
     def newest(self) -> Packet:
         """Return the newest packet; raises `DeviceUnreachable` when there is no fresh one."""
@@ -128,13 +163,16 @@ class RtdeReader:
 
     def close(self) -> None:
         """Let go of the controller."""
-        if self._link is not None:
+        with self._fresh:
+            self._closed = True
+            link, thread = self._link, self._thread
+            self._link = self._thread = None
+        if link is not None:
             with contextlib.suppress(OSError):
-                self._link.shutdown(socket.SHUT_RDWR)
-            self._link.close()
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join(timeout=1.0)
-        self._link = self._thread = None
+                link.shutdown(socket.SHUT_RDWR)
+            link.close()
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(timeout=1.0)
         self._lost = "not connected"
 
     def _silent_s(self) -> float:
@@ -175,19 +213,19 @@ class RtdeReader:
 
     def _read(self, link: socket.socket, recipe: Recipe) -> None:
         try:
-            while self._lost is None:
+            while self._link is link and self._lost is None:
                 kind, body = receive(link, time.monotonic() + self._silence_s)
                 if kind == Frame.DATA_PACKAGE:
-                    self._take(Packet(time.monotonic(), recipe.unpack(body[1:])))
+                    self._take(link, Packet(time.monotonic(), recipe.unpack(body[1:])))
         except TimeoutError:
-            self._lose(f"silent for {self._silence_s:.2f} s")
+            self._lose(link, f"silent for {self._silence_s:.2f} s")
         except (OSError, struct.error) as error:
-            self._lose(str(error))
+            self._lose(link, str(error))
 
-    def _take(self, packet: Packet) -> None:
+    def _take(self, link: socket.socket, packet: Packet) -> None:
         wrong = implausible(packet.values)
         if wrong is not None:
-            self._lose(f"what the controller sends cannot be: {wrong}")
+            self._lose(link, f"what the controller sends cannot be: {wrong}")
             return
         with self._fresh:
             before = self._newest
@@ -196,7 +234,9 @@ class RtdeReader:
                 self._advanced_s = packet.host_t_s
             self._fresh.notify_all()
 
-    def _lose(self, why: str) -> None:
+    def _lose(self, link: socket.socket, why: str) -> None:
+        """Give a link up; one that another has taken the place of counts no more."""
         with self._fresh:
-            self._lost = self._lost or why
+            if self._link is link:
+                self._lost = self._lost or why
             self._fresh.notify_all()

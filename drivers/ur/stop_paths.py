@@ -1,11 +1,13 @@
-"""Two ways to stop the arm that do not pass through ur-rtde.
+"""Ways to stop the arm that do not pass through ur-rtde.
 
 1. ``stop`` on the dashboard server ends the program, on a connection that is kept open.
 2. A program of one line, ``stopj``, sent to the script port takes the place of the program that
    runs. Its connection is made anew each time: one made while the robot was in local mode stays
    read-only for ever, and the port streams robot states that nobody here would read.
+3. The same program, sent to the primary port, which another server of the controller reads.
+4. Where those are not obeyed: ``power off`` on the dashboard server, upon which the brakes fall in.
 
-Either is enough. Each is given a fixed share of time, so that a dead controller cannot hold up the
+Any is enough. Each is given a fixed share of time, so that a dead controller cannot hold up the
 caller.
 """
 
@@ -14,16 +16,17 @@ from __future__ import annotations
 import contextlib
 import socket
 import threading
+from collections.abc import Callable
 
 from drivers.ur.dashboard import DASHBOARD_PORT
 
-SCRIPT_PORT = 30003
+SCRIPT_PORT, PRIMARY_PORT = 30003, 30001
 _CONNECT_S = 0.02
 _MOST_UNREAD = 16
 
 
 class StopPaths:
-    """The two ways; `order` may be called from any thread, as often as one likes.
+    """The ways; `order` may be called from any thread, as often as one likes.
 
     Parameters
     ----------
@@ -44,10 +47,19 @@ class StopPaths:
         with self._lock, contextlib.suppress(OSError):
             self._reopen()
 
-    def order(self) -> list[str]:
-        """Send the stop on both ways; return the names of those that took it. Never raises."""
+    def order(self, *, power_off: bool = False) -> list[str]:
+        """Send the stop on every way; return the names of those that took it. Never raises.
+
+        `power_off` lets the brakes fall in, too; somebody must then switch the arm on again.
+        """
+        ways: dict[str, Callable[[], None]] = {
+            "dashboard": lambda: self._by_dashboard(b"stop\n"),
+            "script port": lambda: self._by_script(SCRIPT_PORT),
+            "primary port": lambda: self._by_script(PRIMARY_PORT),
+        }
+        if power_off:
+            ways["power off"] = lambda: self._by_dashboard(b"power off\n")
         with self._lock:
-            ways = {"dashboard": self._by_dashboard, "script port": self._by_script}
             return [name for name, send in ways.items() if _sent(send)]
 
     def close(self) -> None:
@@ -55,14 +67,14 @@ class StopPaths:
         with self._lock:
             self._drop()
 
-    def _by_dashboard(self) -> None:
+    def _by_dashboard(self, line: bytes) -> None:
         if not self._alive():
             self._reopen()
         assert self._dashboard is not None
-        self._dashboard.sendall(b"stop\n")
+        self._dashboard.sendall(line)
 
-    def _by_script(self) -> None:
-        with socket.create_connection((self._host, SCRIPT_PORT), _CONNECT_S) as link:
+    def _by_script(self, port: int) -> None:
+        with socket.create_connection((self._host, port), _CONNECT_S) as link:
             link.sendall(self._script)
 
     def _alive(self) -> bool:
@@ -96,8 +108,7 @@ class StopPaths:
         self._dashboard = None
 
 
-def _sent(send: object) -> bool:
-    assert callable(send)
+def _sent(send: Callable[[], None]) -> bool:
     try:
         send()
     except OSError:

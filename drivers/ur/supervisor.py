@@ -4,7 +4,8 @@
 
     no order ── order() ──> ordered ──> moving ──> done, at rest, at the target ──> no order
         │                      │           │
-        └── fault, lost link, stop() ──────┴──> stop on both paths, child killed, at rest?
+        └── fault, lost link, stop() ──────┴──> stop on every path, child killed, at rest?
+                                                   ├── not soon: power off, too
                                                    └── not within a second: `stop_failed`
 
 After a stop the control script is gone from the controller. It is loaded again by the next order
@@ -28,7 +29,9 @@ from drivers.ur.verdicts import ProgramWatch, at_rest, missed
 _CYCLE_S = 0.01
 _BEAT_S = 0.2
 _RESEND_S = 0.05
-_STOP_CONFIRM_S, _REPEAT_S = 1.0, 3.0
+_STOP_CONFIRM_S, _REPEAT_S = 1.0, 5.0
+_POWER_OFF_S = 0.7
+"""An arm that obeys stands long before: 0.5 rad/s are braked in 0.1 s."""
 _WHY_S = 0.1
 
 
@@ -97,10 +100,15 @@ class Supervisor:
 
     def stop(self) -> list[str]:
         """Stop the arm; return the names of the paths that took the order."""
-        ways = self._stops.order()
+        ways = self._stops.order(power_off=self._unheeded())
         with self._lock:
             self._cancel()
         return ways
+
+    def _unheeded(self) -> bool:
+        """Whether a stop that was ordered some time ago has not been seen obeyed."""
+        since_s = self._stop_s
+        return since_s is not None and time.monotonic() - since_s > _POWER_OFF_S
 
     def clear(self) -> None:
         """Forget a fault that the operator has mended."""
@@ -128,7 +136,9 @@ class Supervisor:
         """Forget the order and kill the child."""
         self._child_wanted = False
         self._order = None
-        self._stop_s = self._resent_s = time.monotonic()
+        self._resent_s = time.monotonic()
+        # one that is repeated is as old as its first order
+        self._stop_s = self._stop_s or self._resent_s
         if self._child is not None:
             self._child.kill()
             self._killed.append(self._child)
@@ -151,6 +161,8 @@ class Supervisor:
                 self._trip(str(error))
                 self._bury()
                 self._repeat_stop()
+                # whether the arm stands is told by a reading or not at all
+                self._reader.reopen()
             except Exception as error:
                 # nobody would watch the arm any more: whatever it is, stop first
                 self._trip(f"the driver's supervision failed: {error!r}")
@@ -189,7 +201,7 @@ class Supervisor:
         now = time.monotonic()
         pending = self._stop_s is not None and now - self._stop_s < _REPEAT_S
         if pending and now - self._resent_s > _RESEND_S:
-            self._stops.order()
+            self._stops.order(power_off=self._unheeded())
             self._resent_s = now
 
     def _drive(self, packet: Packet) -> None:

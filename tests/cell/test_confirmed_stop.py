@@ -48,7 +48,7 @@ def moving(clock: FastClock) -> Reading:
 
 def stopped(arm: Reading, clock: FastClock) -> StopWord:
     before = arm.state()
-    return ConfirmedStop(arm, clock).see_through(before, underway=True)
+    return ConfirmedStop(arm, clock).see_through(before, least_way_rad=0.0)
 
 
 def test_an_obeyed_stop_is_confirmed_by_readings_that_agree(
@@ -125,7 +125,7 @@ def test_readings_that_prove_nothing_are_never_taken_for_a_stop(
 ) -> None:
     before = moving.state()
     moving.falsify = lambda live: falsify(live, before)
-    word = ConfirmedStop(moving, clock).see_through(before, underway=True)
+    word = ConfirmedStop(moving, clock).see_through(before, least_way_rad=0.0)
     assert not word.stands
     assert why in word.text
     assert word.after_s > DEADLINE_S

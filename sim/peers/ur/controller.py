@@ -14,7 +14,7 @@ from calib.chain.kinematics import ArmKinematics
 from drivers.arm import Arm, Motion, MoveTarget
 from drivers.errors import DeviceError, SafetyError
 from drivers.ur.wire import RTDE_PORT, Value
-from sim.peers.controller_faults import Reported, StopOrders
+from sim.peers.controller_faults import Reported, StopOrders, Stops
 from sim.peers.events import Event
 from sim.peers.listener import Listener
 from sim.peers.ur.dashboard import DashboardServer
@@ -92,10 +92,11 @@ class URController:
         self._ports.clear()
         self.arm.connect()
         self._rtde = RtdeServer(self)
+        scripts = ScriptServer(self)
         servers = {
             DASHBOARD_PORT: DashboardServer(self).serve,
-            PRIMARY_PORT: PrimaryServer(self).serve,
-            SCRIPT_PORT: ScriptServer(self).serve,
+            PRIMARY_PORT: PrimaryServer(self, scripts.serve).serve,
+            SCRIPT_PORT: scripts.serve,
             RTDE_PORT: self._rtde.serve,
         }
         for port, serve in servers.items():
@@ -148,9 +149,15 @@ class URController:
         self._protective_stop_s -= UNLOCK_WAIT_S
 
     def power(self, mode: Robot) -> None:
-        """Switch the arm's power and brakes; without power nothing moves."""
+        """Switch the arm's power and brakes; without power nothing moves.
+
+        As an order to stop it is taken as the faults have it.
+        """
         with self._lock:
             if self.safety is not Safety.NORMAL:
+                return
+            if mode is not Robot.RUNNING and self.faults.stops is not Stops.OBEYED:
+                self.stop_program("power or brakes off")
                 return
             if mode is not Robot.RUNNING:
                 self._end_program()

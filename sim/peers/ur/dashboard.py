@@ -135,6 +135,8 @@ class DashboardServer:
         return "Pausing program" if self._controller.pause() else "Failed to execute: pause"
 
     def _power(self, mode: Robot, answer: str) -> str:
+        if mode is Robot.POWER_OFF and self._controller.stop_orders.refused:
+            return "Failed to execute: power off"
         self._controller.power(mode)
         return answer
 

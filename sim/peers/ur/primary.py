@@ -1,4 +1,4 @@
-"""The controller's primary port, 30001: robot state packages, of which one is the kinematics.
+"""The controller's primary port, 30001: robot state packages out, URScript programs in.
 
 Source: Universal Robots, "Remote Control Via TCP/IP", client interfaces: a package is int32 size,
 uint8 type (16 robot state, 20 message); a robot state holds sub-packages of the same shape, of
@@ -7,9 +7,12 @@ which type 5 is the kinematics information.
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import struct
+import threading
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 from calib.chain.kinematics import ArmKinematics
@@ -32,18 +35,33 @@ class Controller(Protocol):
 
 
 class PrimaryServer:
-    """Sends robot states of one controller."""
+    """Sends robot states of one controller, and takes programs.
 
-    def __init__(self, controller: Controller) -> None:
-        self._controller = controller
+    Parameters
+    ----------
+    controller:
+        Whose states.
+    run_scripts:
+        Runs whatever programs come in on a connection, until it ends.
+    """
+
+    def __init__(
+        self, controller: Controller, run_scripts: Callable[[socket.socket], None]
+    ) -> None:
+        self._controller, self._run_scripts = controller, run_scripts
 
     def serve(self, link: socket.socket) -> None:
         """Send a version message, then a robot state ten times a second."""
+        threading.Thread(target=self._listen, args=(link,), daemon=True).start()
         link.sendall(_package(_MESSAGE, struct.pack(">QBB", 0, 254, 3) + b"\x09URControl"))
         while True:
             if not self._controller.faults.mute:
                 link.sendall(_package(_ROBOT_STATE, self._state()))
             time.sleep(_PERIOD_S)
+
+    def _listen(self, link: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            self._run_scripts(link)
 
     def _state(self) -> bytes:
         mode = _package(_ROBOT_MODE, bytes(41))

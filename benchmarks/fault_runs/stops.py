@@ -1,0 +1,249 @@
+"""Stops that a controller obeys, or does not, at random instants of whole runs, as a table.
+
+    python -m benchmarks.fault_runs.stops [--stand ur+gige] [--only WORDS] [--instants 10]
+
+Each trial is a `cell run` in a process of its own. While the arm is on a slow move, the controller
+is given its fault and the run a Ctrl-C. What comes of it is held against the simulated arm itself:
+a stop is told as done (exit status 4) only where the arm stands, and confirmed wherever there are
+true readings of it; in all other cases the alarm is raised and the status is 5.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from benchmarks.fault_runs.launch import Launch
+from benchmarks.fault_runs.stands import STANDS, Stand
+from cell.sequencer.journal import read_journal
+from cell.storage.files.plan_file import read_plan
+from sim.peers.controller_faults import Stops
+
+_SLOW_DEG_S = 3.0  # so that a move lasts longer than a stop may take to be confirmed
+_POLL_S, _END_S, _WIRE_S = 0.002, 30.0, 0.1
+_LAST_S = 3.0
+_STOPPED, _ALARM = 4, 5
+_ORDERS = ("dashboard: stop", "script: stopj", "script refused", "rws: stop", "rws: motors off")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a controller does with a stop.
+
+    Attributes
+    ----------
+    faults:
+        Values of its `ControllerFaults`.
+    arrives:
+        Whether orders reach it at all.
+    confirmed:
+        Cells in which true readings tell of the stop, so that it must be confirmed.
+    either:
+        Cells in which it may be confirmed by something else that is true.
+    """
+
+    name: str
+    faults: dict[str, Any] = field(default_factory=dict)
+    arrives: bool = True
+    confirmed: tuple[str, ...] = ()
+    either: tuple[str, ...] = ()
+
+
+_ALL = tuple(STANDS)
+_CUT = {"mute": True, "deaf": True}
+KINDS = (
+    Kind("obeyed", confirmed=_ALL),
+    Kind("obeyed 0.5 s late", {"stops": Stops.LATE, "late_s": 0.5}, confirmed=_ALL),
+    Kind("taken and ignored", {"stops": Stops.IGNORED}),
+    Kind("refused, no watchdog", {"stops": Stops.REFUSED, "watchdog_fails": True}),
+    Kind("cable cut", _CUT, arrives=False),
+    Kind("cable cut, no watchdog", _CUT | {"watchdog_fails": True}, arrives=False),
+    Kind("mute", {"mute": True}),
+    # Robot Web Services tell no clock that could stand still
+    Kind("frozen clock", {"frozen_clock": True}, confirmed=("abb+robotiq",)),
+    # joints that never change are told from an arm at rest only by the way it must have gone
+    # since; where they are as new as the order, RAPID's having stopped is what confirms it
+    Kind("old readings", {"old_readings": True}, either=("abb+robotiq",)),
+)
+
+
+@dataclass
+class StopTrial:
+    """What came of one stop; times are from the Ctrl-C.
+
+    Attributes
+    ----------
+    order_s, halt_s, word_s:
+        To the first order at the controller, to the arm's halt (both None where there was none
+        while the run lasted), and to the word of it.
+    moving:
+        Whether the arm moved when the word was said.
+    """
+
+    order_s: float | None
+    halt_s: float | None
+    word_s: float
+    moving: bool
+    exit_status: int | None
+    said: str
+
+    def complaints(self, kind: Kind, stand: str) -> list[str]:
+        """What was not as it must be."""
+        found = []
+        if self.exit_status == _STOPPED and self.moving:
+            found.append("told as stopped while it moved")
+        wanted = _STOPPED if stand in kind.confirmed else _ALARM
+        if stand in kind.either and self.exit_status == _STOPPED:
+            wanted = _STOPPED
+        if self.exit_status != wanted:
+            found.append(f"exit status {self.exit_status}, not {wanted}")
+        if wanted == _ALARM and "PRESS THE EMERGENCY STOP" not in self.said:
+            found.append("no alarm")
+        if kind.arrives and (self.order_s is None or self.order_s > _WIRE_S):
+            found.append(f"the order was there after {self.order_s} s")
+        return found
+
+
+@contextmanager
+def slow_stand(name: str, folder: Path) -> Iterator[Stand]:
+    """A cell of `STANDS` whose arm moves slowly."""
+    with STANDS[name](folder) as stand:
+        path = stand.plan.path
+        path.write_text(
+            json.dumps(json.loads(path.read_text()) | {"joint_speed_deg_s": _SLOW_DEG_S})
+        )
+        yield replace(stand, plan=read_plan(path))
+
+
+def stop_trial(stand: Stand, folder: Path, kind: Kind, instant_s: float) -> StopTrial | None:
+    """One stop, `instant_s` after the first motion; None where the run ended before it."""
+    launch = Launch(stand.plan.path, folder)
+    try:
+        if not (_moving(stand, launch) and _moving(stand, launch, time.monotonic() + instant_s)):
+            return None
+        return _stopped(stand, folder, kind, launch)
+    finally:
+        launch.finish()
+        stand.arm.restore()
+        stand.arm.halt("the trial is over")
+
+
+def _moving(stand: Stand, launch: Launch, from_s: float = 0.0) -> bool:
+    """Wait until the arm moves, at that time or after it; False where the run ended before."""
+    while time.monotonic() < from_s or not stand.truly_moving():
+        if launch.ended:
+            return False
+        time.sleep(_POLL_S)
+    return True
+
+
+def _stopped(stand: Stand, folder: Path, kind: Kind, launch: Launch) -> StopTrial:
+    for name, value in kind.faults.items():
+        setattr(stand.arm.faults, name, value)
+    asked_s, asked_unix_s = time.monotonic(), time.time()
+    launch.send(signal.SIGINT)
+    moved: list[tuple[float, bool]] = []
+    while not launch.ended and time.monotonic() < asked_s + _END_S:
+        moved.append((time.monotonic() - asked_s, stand.truly_moving()))
+        time.sleep(_POLL_S)
+    ended_s = time.monotonic() - asked_s
+    launch.finish()
+    word_s = _word_s(folder, asked_unix_s, ended_s)
+    orders = [
+        event.t_s - asked_s
+        for event in stand.arm.events
+        if event.t_s >= asked_s and event.what.startswith(_ORDERS)
+    ]
+    halted = next((t_s for t_s, moving in moved if not moving), None)
+    at_word = [moving for t_s, moving in moved if t_s <= word_s]
+    return StopTrial(
+        min(orders, default=None), halted, word_s, at_word[-1], launch.exit_status, launch.said
+    )
+
+
+def _word_s(folder: Path, asked_unix_s: float, ended_s: float) -> float:
+    """When the run journalled what became of the stop; its end where it did not."""
+    halts = [event["at"] for event in read_journal(folder) if event["event"] == "halt"]
+    at_s = datetime.fromisoformat(halts[-1]).timestamp() - asked_unix_s if halts else ended_s
+    return at_s if at_s >= 0.0 else ended_s
+
+
+def stops_of(stand: Stand, folder: Path, name: str, kind: Kind, count: int, seed: int) -> list[Any]:
+    """The same kind at random instants, the same ones every time; (trial, complaints) each."""
+    chance = random.Random(f"{seed} {name} {kind.name}")
+    found: list[Any] = []
+    for number in range(count):
+        words = "-".join(kind.name.replace(",", "").split())
+        trial = stop_trial(stand, folder / f"{words}-{number}", kind, chance.uniform(0.0, _LAST_S))
+        if trial is not None:
+            found.append((trial, trial.complaints(kind, name)))
+    return found
+
+
+def _worst(values: list[float | None]) -> str:
+    told = [value for value in values if value is not None]
+    missing = len(values) - len(told)
+    worst = f"{max(told):.3f} s" if told else "-"
+    return f"{worst}, {missing} never" if told and missing else worst
+
+
+def _row(name: str, kind: Kind, found: list[Any]) -> str:
+    trials = [trial for trial, _ in found]
+    good = sum(not complaints for _, complaints in found)
+    confirmed = sum(trial.exit_status == _STOPPED for trial in trials)
+    cells = [
+        name,
+        kind.name,
+        f"{good} of {len(found)}",
+        f"{confirmed} of {len(found)}",
+        _worst([trial.order_s for trial in trials]),
+        _worst([trial.halt_s for trial in trials]),
+        _worst([trial.word_s for trial in trials]),
+        ", ".join(sorted({str(trial.exit_status) for trial in trials})),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print the table; exit status 1 unless everything was as it must be."""
+    asked = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    asked.add_argument("--stand", choices=STANDS)
+    asked.add_argument("--only", default="")
+    asked.add_argument("--instants", type=int, default=10)
+    asked.add_argument("--seed", type=int, default=1)
+    words = asked.parse_args()
+    bad = 0
+    print(
+        "| cell | the stop is | told as it was | confirmed | order at the controller, worst"
+        " | halt, worst | word, worst | exit |\n|---|---|---|---|---|---|---|---|"
+    )
+    for name in STANDS:
+        if words.stand not in (None, name):
+            continue
+        with tempfile.TemporaryDirectory() as folder, slow_stand(name, Path(folder)) as stand:
+            for kind in KINDS:
+                if words.only not in kind.name:
+                    continue
+                found = stops_of(stand, Path(folder), name, kind, words.instants, words.seed)
+                print(_row(name, kind, found), flush=True)
+                for trial, complaints in found:
+                    bad += bool(complaints)
+                    for complaint in complaints:
+                        print(f"{name}: {kind.name}: {complaint}\n{trial.said}", file=sys.stderr)
+                bad += words.instants - len(found)
+    sys.exit(bool(bad))
+
+
+if __name__ == "__main__":
+    main()
