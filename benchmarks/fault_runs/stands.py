@@ -87,7 +87,7 @@ def ur_gige(folder: Path) -> Iterator[Stand]:
 def abb_robotiq(folder: Path) -> Iterator[Stand]:
     """An IRB 140 and a Robotiq wrist camera."""
     arm_at, camera_at = _address(), f"{_address()}:4242"
-    robot = {"driver": "abb", "address": f"{arm_at}:8610"}
+    robot = {"driver": "abb", "address": f"{arm_at}:8610", "factory_password": True}
     camera = {"driver": "robotiq", "model": "robotiq_wrist", "address": camera_at}
     plan = _plan(folder, "irb140-eosens", robot, camera)
     with ExitStack() as stack:

@@ -20,7 +20,7 @@ from cell.sequencer.clock import HostClock
 from cell.sequencer.guard import Guard
 from cell.sequencer.stop import StopRequest
 from cell.sequencer.watched_arm import WatchedArm
-from drivers.abb import ABBArm, ABBSettings
+from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings
 from drivers.arm import Arm
 from drivers.ur import URArm, URSettings
 
@@ -63,7 +63,10 @@ def patient_driver(name: str, devices: Stand) -> Arm:
     """Time-outs that a busy machine does not run into."""
     if name.startswith("ur"):
         return URArm(devices.arm.address, URSettings(silence_s=2.0, start_timeout_s=30.0))
-    return ABBArm(devices.arm.url, ABBSettings(silence_s=3.0, read_timeout_s=2.0))
+    return ABBArm(
+        devices.arm.url,
+        ABBSettings(login=FACTORY_LOGIN, silence_s=3.0, read_timeout_s=2.0),
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
