@@ -16,6 +16,7 @@ from cell.errors import StoppedByOperator
 from cell.sequencer.clock import Clock
 from cell.sequencer.confirmed_stop import ConfirmedStop, StopWord
 from cell.sequencer.guard import Guard
+from cell.sequencer.reading_watch import ARRIVING_RAD, ReadingWatch
 from cell.sequencer.rest import fastest_rad_s
 from cell.sequencer.stop import StopRequest
 from cell.storage.files.plan_file import Settle
@@ -24,7 +25,6 @@ from drivers.errors import ArmStopped, DeviceError, StopFailed
 
 POLL_S = 0.008
 READING_PATIENCE_S = 1.0
-_ARRIVED_RAD = 0.02
 _MOVE_PATIENCE = 3.0
 _MOVE_SLACK_S = 15.0
 _UNDERWAY_RAD_S, _SURE_SHARE = 0.02, 0.3
@@ -57,6 +57,10 @@ class WatchedArm:
     _newest: ArmState | None = field(default=None, init=False)
     _previous: ArmState | None = field(default=None, init=False)
     _goal_rad: FloatArray | None = field(default=None, init=False)
+    _readings: ReadingWatch = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._readings = ReadingWatch(self.guard)
 
     def connect(self) -> FloatArray:
         """Open the link; returns the (6,) joint angles the arm stands at."""
@@ -73,6 +77,8 @@ class WatchedArm:
             Somebody asked for a stop.
         ArmStopped, DeviceUnreachable
             The arm stopped by itself, or its readings are stale.
+        SafetyError
+            It is not where it was told to be, or its readings cannot be: see `ReadingWatch`.
         """
         if self.stop_request.asked:
             raise StoppedByOperator(f"stopped by {self.stop_request.reason}")
@@ -81,6 +87,8 @@ class WatchedArm:
         self._remember(state)
         if state.motion is Motion.STOPPED_BY_FAULT or state.fault is not None:
             raise ArmStopped(state.fault or "the arm stopped by itself and does not say why")
+        if state.joints_rad is not None:
+            self._readings.check(state)
         return state
 
     def _remember(self, state: ArmState) -> None:
@@ -97,7 +105,7 @@ class WatchedArm:
             return -1.0
         speed_rad_s = self._speed_rad_s(newest)
         left_rad = float(np.abs(np.subtract(newest.joints_rad, goal)).max())
-        if not (speed_rad_s > _UNDERWAY_RAD_S and left_rad > _ARRIVED_RAD):
+        if not (speed_rad_s > _UNDERWAY_RAD_S and left_rad > ARRIVING_RAD):
             return -1.0
         age_s = self.clock.now() - newest.host_t_s
         return _SURE_SHARE * speed_rad_s * max(age_s, 0.0) if undisturbed else 0.0
@@ -147,13 +155,15 @@ class WatchedArm:
         target = self.guard.target(here, there, where)
         ordered_s = self.clock.now()
         self._goal_rad = there
+        self._readings.moves(here, there, target.joint_speed_rad_s)
         self.arm.start_move(target)
         patience_s = _MOVE_PATIENCE * self.guard.move_time_s(here, there) + _MOVE_SLACK_S
         while True:
             self.clock.sleep(POLL_S)
             state = self.watch()
             off = float(np.abs(joints_of(state) - there).max())
-            if state.host_t_s > ordered_s and state.motion is Motion.STEADY and off < _ARRIVED_RAD:
+            if state.host_t_s > ordered_s and state.motion is Motion.STEADY and off < ARRIVING_RAD:
+                self._readings.stands(there, ARRIVING_RAD)
                 return here
             if self.clock.now() - ordered_s > patience_s:
                 raise DeviceError(
@@ -172,6 +182,7 @@ class WatchedArm:
             elif still_since_s is None:
                 still_since_s = state.host_t_s
             if still_since_s is not None and state.host_t_s - still_since_s >= settle.still_s:
+                self._readings.stands(joints_of(state))
                 return
             if self.clock.now() - began_s > settle.timeout_s:
                 raise DeviceError(
