@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 from cell.devices.genicam_options import genicam_options
 from cell.errors import InputError
+from cell.sequencer.bounded import check_bounded
 from cell.sequencer.sequencer import Devices
 from cell.storage.files.camera_file import (
     GenicamCamera,
@@ -131,8 +132,12 @@ def real_devices(plan: Plan) -> Devices:
     ------
     InputError
         Arm or camera is a simulated one, or there is no login for the arm's controller.
+    SafetyError
+        The cell does not say where its arm may go: see `check_bounded`.
     """
-    return Devices(arm_of(plan.cell), camera_of(plan.cell))
+    devices = Devices(arm_of(plan.cell), camera_of(plan.cell))
+    check_bounded(plan.cell)
+    return devices
 
 
 def arm_of(cell: CellFile) -> Arm:

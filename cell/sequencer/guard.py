@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -45,10 +45,18 @@ class Guard:
 
     @cached_property
     def kinematics(self) -> ArmKinematics:
-        """The arm's kinematics; raises `InputError` for a model nobody knows."""
-        model = self.cell.robot.model
+        """The arm's kinematics, its joints as far as the cell lets them turn.
+
+        Raises `InputError` for a model nobody knows.
+        """
+        model, ranges = self.cell.robot.model, self.cell.joint_limits_deg
         try:
-            return arm(model or "")
+            known = arm(model or "")
+            return (
+                known
+                if ranges is None
+                else replace(known, limits_rad=ranges.narrowed(known.limits_rad))
+            )
         except UnknownArm:
             raise InputError(
                 f"cell {self.cell.name}: robot.model: {model} is not known; known are"
@@ -101,6 +109,18 @@ class Guard:
                 for i in out
             )
             raise SafetyError(f"{where}: {told}")
+
+    def check_start(self, start_rad: FloatArray) -> None:
+        """Raise `SafetyError` where the arm stands outside its limits.
+
+        Between two places within them a straight joint move stays within them.
+        """
+        try:
+            self._check_limits(start_rad, "where the arm stands")
+        except SafetyError as refusal:
+            raise SafetyError(
+                f"{refusal}. Drive it back by hand, or correct `joint_limits_deg` of the cell."
+            ) from None
 
     def path(self, start_rad: FloatArray, end_rad: FloatArray) -> FloatArray:
         """(S, 6) joint angles along the straight joint move, no farther than 3° apart."""
@@ -177,6 +197,7 @@ class Guard:
             With every view that cannot be taken, one a line; a `SafetyError` where one of them
             is refused by a limit.
         """
+        self.check_start(start_rad)
         joints: list[FloatArray] = []
         refused: list[Exception] = []
         here = start_rad

@@ -260,7 +260,7 @@ def run_on_corners(
     guard = NearGuard.around(cell, start, LayoutDoubt())
     stops = [start]
     try:
-        guard.check_start()
+        guard.check_surroundings()
         guide = BootstrapGuide(cell, cell.layout, guard, LayoutDoubt())
         guide.checked(frame_of(cell, start, 0, rng))
         while (view := guide.next_view()) is not None:

@@ -62,8 +62,10 @@ class Listener(Watcher):
 class Bench:
     """A plan, fakes, and what a run of them left."""
 
-    def __init__(self, folder: Path, plan: str = PLAN + NO_BOARD, *, real: bool = False) -> None:
-        (folder / "bench.yaml").write_text(CELL)
+    def __init__(
+        self, folder: Path, plan: str = PLAN + NO_BOARD, *, real: bool = False, cell: str = CELL
+    ) -> None:
+        (folder / "bench.yaml").write_text(cell)
         (folder / "plan.yaml").write_text(plan)
         self.folder = folder / "run"
         self.clock = HostClock() if real else FastClock()
@@ -479,6 +481,40 @@ def test_a_plan_with_a_bad_view_is_refused_before_the_first_move(
     assert result.finish.exit_status == status
     assert message in result.reason
     assert "views.4 (view 4)" in result.reason
+    assert "move" not in bench.arm.calls
+
+
+WRIST = "joint_limits_deg: {joint_6: [-5, 5], joint_2: [-400, 400]}\n"
+
+
+def test_a_narrowed_joint_is_held_in_every_view_and_the_others_keep_the_makers_range(
+    tmp_path: Path,
+) -> None:
+    bench = Bench(tmp_path, cell=CELL + WRIST)
+    result = bench.run()
+    assert result.finish is Finish.SAFETY
+    assert "views.3 (last): joint 6 at 10.0° is outside -5..5°" in result.reason
+    assert "joint 2" not in result.reason
+    assert "move" not in bench.arm.calls
+    low, high = Guard.of(bench.plan).kinematics.limits_rad.T
+    assert np.degrees(high[1]) == pytest.approx(360)
+    assert np.degrees([low[5], high[5]]) == pytest.approx([-5, 5])
+
+
+def test_a_view_given_as_a_pose_is_reached_within_the_narrowed_joints(tmp_path: Path) -> None:
+    guard = Guard.of(Bench(tmp_path, cell=CELL + WRIST).plan)
+    turned = HOME + np.array([0, 0, 0, 0, 0, 2 * np.pi])
+    joints = guard.kinematics.inverse(guard.kinematics.forward(HOME), turned)
+    assert joints == pytest.approx(HOME)
+
+
+def test_an_arm_that_stands_outside_a_narrowed_joint_is_not_moved(tmp_path: Path) -> None:
+    narrow = "joint_limits_deg: {joint_6: [-5, 15]}\n"
+    bench = Bench(tmp_path, cell=CELL + narrow)
+    bench.arm.start = bench.arm.end = HOME + np.radians([0, 0, 0, 0, 0, 60])
+    result = bench.run()
+    assert result.finish is Finish.SAFETY
+    assert "where the arm stands: joint 6 at 60.0° is outside -5..15°. Drive" in result.reason
     assert "move" not in bench.arm.calls
 
 

@@ -8,11 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+import numpy as np
+from pydantic import (
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
-from calib.views import Mount
+from calib.views import FloatArray, Mount
 from cell.storage.files.board_file import Charuco, Chessboard
 from cell.storage.files.camera_file import CameraFile
 from cell.storage.files.parts import Box, Distance, Duration, Finite, Joints, Part, Pose, Positive
@@ -114,6 +121,41 @@ class Layout(Part):
     """The camera's scale factor to a few percent; from lens and pixel size where it is null."""
 
 
+Range = tuple[Finite, Finite]
+
+
+class JointLimits(Part):
+    """Ranges of joints in degrees, low and high; those that are not named keep the maker's."""
+
+    joint_1: Range | None = None
+    joint_2: Range | None = None
+    joint_3: Range | None = None
+    joint_4: Range | None = None
+    joint_5: Range | None = None
+    joint_6: Range | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        for name, given in self.given().items():
+            if not given[0] < given[1]:
+                raise ValueError(f"{name}: {given[0]:g} is not below {given[1]:g}")
+        return self
+
+    def given(self) -> dict[str, Range]:
+        """The ranges that are given, by the joint's name."""
+        ranges = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: value for name, value in ranges.items() if value is not None}
+
+    def narrowed(self, limits_rad: FloatArray) -> FloatArray:
+        """(6, 2) limits, each no wider than it was."""
+        low, high = limits_rad.T.copy()
+        for name, given in self.given().items():
+            joint = int(name.removeprefix("joint_")) - 1
+            low[joint] = max(low[joint], np.radians(given[0]))
+            high[joint] = min(high[joint], np.radians(given[1]))
+        return np.stack([low, high], axis=1)
+
+
 class EffectFile(Part):
     """One effect by its name in the catalogue, with its values."""
 
@@ -180,8 +222,23 @@ class CellFile(Part):
     workspace: Box | None = None
     """The arm's links and the camera stay inside this box."""
     keep_out: tuple[Box, ...] = ()
-    """They stay out of these."""
+    """They stay out of these. A real arm is refused until the key is there, even if empty: `[]`."""
+    no_workspace_because: str | None = Field(default=None, min_length=10)
+    """Why nothing around this arm can be hit: with it, a real arm is moved without `workspace`."""
+    joint_limits_deg: JointLimits | None = None
+    """Narrower ranges of joints than the maker's: for cables, or a wrist that must not turn far."""
     simulation: Simulation | None = None
+
+    @model_serializer(mode="wrap")
+    def _with_what_was_said(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # that nothing is to be kept out of is something else than not having said so
+        data: dict[str, Any] = serialize(self)
+        return data | ({"keep_out": []} if self.says_keep_out and not self.keep_out else {})
+
+    @property
+    def says_keep_out(self) -> bool:
+        """Whether the file has the key, if only to say that there is nothing."""
+        return "keep_out" in self.model_fields_set
 
     def as_mapping(self) -> dict[str, Any]:
         """Plain dicts and lists, keys as in the file, defaults left out."""

@@ -48,8 +48,9 @@ class NearGuard(Guard):
         cell = self.cell.model_copy(update={"keep_out": (*self.cell.keep_out, box)})
         return NearGuard(cell, self.speed_m_s, self.joint_speed_rad_s, self.start_rad)
 
-    def check_start(self) -> None:
+    def check_surroundings(self) -> None:
         """Raise `SafetyError` where the arm stands too near to a box to be moved at all."""
+        self.check_start(self.start_rad)
         try:
             self.check_move(self.start_rad, self.start_rad, "where the arm stands")
         except SafetyError as refusal:

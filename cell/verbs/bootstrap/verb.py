@@ -116,7 +116,7 @@ class Bootstrap:
         """
         start_rad = where_it_stands(devices.arm)
         guard = NearGuard.around(self.cell, start_rad, self.told)
-        guard.check_start()
+        guard.check_surroundings()
         guide = self._guide(guard)
         result = record_plan(
             self._plan(start_rad, self.cell),
