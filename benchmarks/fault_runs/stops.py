@@ -30,7 +30,9 @@ from cell.sequencer.journal import read_journal
 from cell.storage.files.plan_file import read_plan
 from sim.peers.controller_faults import Stops
 
-_SLOW_DEG_S = 3.0  # so that a move lasts longer than a stop may take to be confirmed
+_SLOW_DEG_S, _WIDE_DEG = 3.0, 30.0
+"""Moves of the wrist that last longer than a stop may take to be confirmed."""
+_TRIES = 3
 _POLL_S, _END_S, _WIRE_S = 0.002, 30.0, 0.1
 _LAST_S = 3.0
 _STOPPED, _ALARM = 4, 5
@@ -117,12 +119,13 @@ class StopTrial:
 
 @contextmanager
 def slow_stand(name: str, folder: Path) -> Iterator[Stand]:
-    """A cell of `STANDS` whose arm moves slowly."""
+    """A cell of `STANDS` whose arm makes long, slow moves."""
     with STANDS[name](folder) as stand:
         path = stand.plan.path
-        path.write_text(
-            json.dumps(json.loads(path.read_text()) | {"joint_speed_deg_s": _SLOW_DEG_S})
-        )
+        plan = json.loads(path.read_text()) | {"joint_speed_deg_s": _SLOW_DEG_S}
+        for number, view in enumerate(plan["views"]):
+            view["joints_deg"][-1] += _WIDE_DEG if number % 2 else -_WIDE_DEG
+        path.write_text(json.dumps(plan))
         yield replace(stand, plan=read_plan(path))
 
 
@@ -183,7 +186,9 @@ def stops_of(stand: Stand, folder: Path, name: str, kind: Kind, count: int, seed
     """The same kind at random instants, the same ones every time; (trial, complaints) each."""
     chance = random.Random(f"{seed} {name} {kind.name}")
     found: list[Any] = []
-    for number in range(count):
+    for number in range(_TRIES * count):
+        if len(found) == count:
+            break
         words = "-".join(kind.name.replace(",", "").split())
         trial = stop_trial(stand, folder / f"{words}-{number}", kind, chance.uniform(0.0, _LAST_S))
         if trial is not None:

@@ -152,6 +152,8 @@ class Sequencer:
         error, word = self._arm.stop(fault)
         if word is not None:
             self._note("halt", **vars(word))
+            if fault is not None and word.stands:
+                self._tell(State.STOPPING, word.text)
         return error
 
     # -- one view after the other ------------------------------------------------------------

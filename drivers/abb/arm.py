@@ -136,7 +136,9 @@ class ABBArm:
         self._supervisor = supervisor
 
     def _reading(self, supervisor: Supervisor) -> Reading:
-        streamed = self._egm.fresh() if self._egm is not None else None
+        # a stream that has ended with its program tells of the last moment of the way
+        streaming = self._egm is not None and supervisor.busy
+        streamed = self._egm.fresh() if streaming and self._egm is not None else None
         if streamed is not None:
             return streamed
         if supervisor.newest is None or supervisor.silent_s > self._settings.silence_s:

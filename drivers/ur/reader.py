@@ -12,10 +12,11 @@ import struct
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable
 from drivers.ur.plausible import implausible
+from drivers.ur.sample_times import SampleTimes
 from drivers.ur.wire import PROTOCOL_VERSION, RTDE_PORT, Frame, Recipe, Value, encode, receive
 
 OUTPUTS = [
@@ -41,7 +42,7 @@ class Packet:
     Attributes
     ----------
     host_t_s:
-        Host clock (`time.monotonic`) when it arrived.
+        Host clock (`time.monotonic`) when it was sampled: see `SampleTimes`.
     values:
         The `OUTPUTS` as the controller sent them: radians, metres, seconds.
     """
@@ -212,11 +213,14 @@ class RtdeReader:
                 return answer
 
     def _read(self, link: socket.socket, recipe: Recipe) -> None:
+        times = SampleTimes()
         try:
             while self._link is link and self._lost is None:
                 kind, body = receive(link, time.monotonic() + self._silence_s)
                 if kind == Frame.DATA_PACKAGE:
-                    self._take(link, Packet(time.monotonic(), recipe.unpack(body[1:])))
+                    packet = Packet(time.monotonic(), recipe.unpack(body[1:]))
+                    sampled_s = times.host_t_s(packet.host_t_s, packet.number("timestamp"))
+                    self._take(link, replace(packet, host_t_s=sampled_s))
         except TimeoutError:
             self._lose(link, f"silent for {self._silence_s:.2f} s")
         except (OSError, struct.error) as error:
@@ -231,7 +235,7 @@ class RtdeReader:
             before = self._newest
             self._newest = packet
             if before is None or packet.values["timestamp"] != before.values["timestamp"]:
-                self._advanced_s = packet.host_t_s
+                self._advanced_s = time.monotonic()
             self._fresh.notify_all()
 
     def _lose(self, link: socket.socket, why: str) -> None:

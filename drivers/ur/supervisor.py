@@ -215,7 +215,8 @@ class Supervisor:
         if not self._order_sent:
             self._child.move(self._order)
             self._order_sent = True
-        elif at_rest(packet):
+        elif at_rest(packet) and time.monotonic() - packet.host_t_s < self._child.in_phase_s:
+            # a packet from before the child said so may be from before the motion
             order, self._order = self._order, None
             off = missed(order, packet)
             if off is not None:
