@@ -24,10 +24,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from benchmarks.fault_runs.launch import Launch
 from benchmarks.fault_runs.stands import STANDS, Stand
 from cell.sequencer.journal import read_journal
 from cell.storage.files.plan_file import read_plan
+from drivers.arm import MoveTarget
 from sim.peers.controller_faults import Stops
 
 _SLOW_DEG_S, _WIDE_DEG = 3.0, 30.0
@@ -140,6 +143,21 @@ def stop_trial(stand: Stand, folder: Path, kind: Kind, instant_s: float) -> Stop
         launch.finish()
         stand.arm.restore()
         stand.arm.halt("the trial is over")
+        _home(stand)
+
+
+def _home(stand: Stand) -> None:
+    """Back to where the plan's first, long move begins."""
+    assert stand.plan.cell.layout is not None
+    _wait_for_rest(stand)
+    home = np.radians(stand.plan.cell.layout.home_deg)
+    stand.sim.start_move(MoveTarget(tuple(home.tolist()), None, 5.0, 2.0))
+    _wait_for_rest(stand)
+
+
+def _wait_for_rest(stand: Stand) -> None:
+    while stand.truly_moving():
+        time.sleep(_POLL_S)
 
 
 def _moving(stand: Stand, launch: Launch, from_s: float = 0.0) -> bool:

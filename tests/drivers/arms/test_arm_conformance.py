@@ -175,6 +175,7 @@ def test_a_fault_stops_the_arm_is_told_in_words_and_stays(connected):
     assert len(connected.arm.state().fault.split()) > 1
     with pytest.raises(ArmStopped):
         connected.arm.start_move(quickly(connected.home))
+    assert until(lambda: not connected.truly_moving(), 2.0)
     halted = connected.true_joints()
     time.sleep(0.4)
     assert moved_rad(connected.true_joints(), halted) < 1e-6
@@ -199,6 +200,7 @@ def test_a_lost_link_is_told_within_two_seconds_and_blocks_nobody(connected):
         connected.arm.start_move(quickly(connected.home))
     if not connected.watched:
         return
+    assert until(lambda: not connected.truly_moving(), 2.0)
     halted = connected.true_joints()
     time.sleep(0.2)
     assert moved_rad(connected.true_joints(), halted) < 1e-6
