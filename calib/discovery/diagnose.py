@@ -21,6 +21,7 @@ from calib.discovery.diagnosis import (
     Verdict,
 )
 from calib.discovery.history import with_history
+from calib.discovery.laws.arm_field import is_arm_field, made_anew
 from calib.discovery.laws.contest import law_leads
 from calib.discovery.laws.telling import told_law
 from calib.discovery.locate import Cell, locate
@@ -153,7 +154,7 @@ def _diagnosis(
     search = structure.search
     after = search.best.fit
     everything = Fitter(repaired.views, repaired.has_robot)
-    twin = everything.settled(_restarted(after, len(repaired.views), held))
+    twin = _with_field_anew(everything, _restarted(after, len(repaired.views), held))
     plain = everything.fit(before.model, before.noise)
     judge = _judge(plain.noise, twin.noise)
     fits = _Fits(before, after, twin, plain)
@@ -177,6 +178,17 @@ def _diagnosis(
         rejected=repaired.rejected,
         said=(*repaired.said, *_pictures(twin, repaired.views), *_unseen(repaired.views)),
     )
+
+
+def _with_field_anew(everything: Fitter, start: JointFit) -> JointFit:
+    """Fit to all frames; a field of the arm is then one of all frames, too."""
+    known = next((p for p in start.model.effects if is_arm_field(p)), None)
+    if known is None:
+        return everything.settled(start)
+    rest = tuple(p for p in start.model.effects if not is_arm_field(p))
+    bare = everything.fit(start.model.with_effects(rest), start.noise, start.own_error)
+    field = made_anew(bare, everything.views, known)
+    return everything.with_effects(bare, (*bare.model.effects, field))
 
 
 def _restarted(fit: JointFit, frames: int, held: BoolArray) -> JointFit:

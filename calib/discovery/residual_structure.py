@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from calib.chain.empirical import present_curve
 from calib.chain.model import walk
+from calib.discovery.laws.arm_field import with_arm_field
 from calib.discovery.laws.contest import as_cell, demanded
 from calib.discovery.laws.review import drop_beside_kinematics, drop_unsupported, replaced_by_laws
 from calib.discovery.locate import Cell, locate
@@ -64,6 +65,7 @@ def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> Res
     search.drop_beside_curves()
     drop_beside_kinematics(search)
     drop_unsupported(search, beside_field=any(cell.is_field for cell in found))
+    found += with_arm_field(search)
     present = {p.effect.label for p in search.best.fit.model.effects}
     kept = [cell for cell in found if cell.law is None or cell.law.effect.label in present]
     return ResidualStructure(search, known + tuple(kept))

@@ -12,6 +12,7 @@ from functools import cache
 
 from calib.chain.effect import Effect, Present
 from calib.chain.empirical import UNNAMED, empirical_from
+from calib.chain.laws.arm_field import FIELD, field_from
 from calib.chain.laws.law import law_from
 
 
@@ -56,9 +57,16 @@ def make_effect(name: str, given: Mapping[str, float | str | Sequence[float]]) -
     law = given.get("law")
     numbers = _flat(name, {key: value for key, value in given.items() if key != "law"})
     if name == UNNAMED:
-        return law_from(str(law), numbers) if ":" in str(law) else empirical_from(str(law), numbers)
+        return _unnamed(str(law), numbers)
     effect = find_effect(name, None if law is None else str(law))
     return Present(effect, effect.values(numbers))
+
+
+def _unnamed(law: str, numbers: Mapping[str, float]) -> Present:
+    """Return the law, field or curve that a file tells."""
+    if law.startswith(FIELD):
+        return field_from(law, numbers)
+    return law_from(law, numbers) if ":" in law else empirical_from(law, numbers)
 
 
 def _flat(name: str, given: Mapping[str, float | str | Sequence[float]]) -> dict[str, float]:

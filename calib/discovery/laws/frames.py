@@ -93,16 +93,14 @@ def frame_blocks(fit: JointFit, views: Views) -> FrameBlocks:
     information, gradient = _marginal(fit, raw)
     corners = fit.equations.corner_numbers
     order = _corners_first(base, len(components), corners)
-    print_information = fit.noise.print_m**-2.0 if corners else 0.0
-    prior = np.concatenate([prior_information(fit.unknowns), np.full(corners, print_information)])
-    at = np.concatenate([amounts(fit.model, fit.unknowns), fit.equations.corner_shift])
+    prior, pull = _priors(fit)
     return FrameBlocks(
         components=components,
         state=state,
         information=information[:, order][:, :, order],
         gradient=gradient[:, order],
         prior=prior,
-        pull=-prior * at,
+        pull=pull,
         pixel_information=raw.shared[:, order][:, :, order],
         pixel_gradient=raw.gradient[:, order]
         + np.einsum("nfp,nf->np", raw.cross[:, :, order], fit.own_error),
@@ -115,6 +113,43 @@ def _corners_first(base: int, sites: int, corners: int) -> list[int]:
     """Order in which the printed corners' shifts stand behind the fit's other numbers."""
     after = base + sites
     return [*range(base), *range(after, after + corners), *range(base, after)]
+
+
+@dataclass(frozen=True)
+class FrameNormals:
+    """Normal equations of each frame, in its own F numbers and T shared ones, in pixels.
+
+    Attributes
+    ----------
+    own, cross, own_residual, shared, gradient:
+        (N, F, F), (N, F, T), (N, F), (N, T, T), (N, T).
+    prior, pull:
+        As in `FrameBlocks`.
+    """
+
+    own: FloatArray
+    cross: FloatArray
+    own_residual: FloatArray
+    shared: FloatArray
+    gradient: FloatArray
+    prior: FloatArray
+    pull: FloatArray
+
+
+def frame_normals(fit: JointFit, views: Views) -> FrameNormals:
+    """The equations of a fit, frame by frame."""
+    raw = _raw(fit, views, fit.dependence, fit.dependence.local)
+    prior, pull = _priors(fit)
+    return FrameNormals(raw.own, raw.cross, raw.own_residual, raw.shared, raw.gradient, prior, pull)
+
+
+def _priors(fit: JointFit) -> tuple[FloatArray, FloatArray]:
+    """(T,) inverse variances of the shared numbers' priors, and their gradient."""
+    corners = fit.equations.corner_numbers
+    print_information = fit.noise.print_m**-2.0 if corners else 0.0
+    prior = np.concatenate([prior_information(fit.unknowns), np.full(corners, print_information)])
+    at = np.concatenate([amounts(fit.model, fit.unknowns), fit.equations.corner_shift])
+    return prior, -prior * at
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.chain.effect import Present
+from calib.chain.laws.arm_field import rms
 from calib.chain.laws.law import Law, law_of
 from calib.discovery.diagnosis import FoundLaw, Value
+from calib.discovery.laws.arm_field import is_arm_field
 from calib.solver.joint import JointFit
 from calib.views import FloatArray
 
@@ -57,6 +59,8 @@ def told_law(
     twin: JointFit, index: int, holdout_gain_px: float, rivals: tuple[str, ...]
 ) -> FoundLaw:
     """What is known of the law that is effect `index` of the twin."""
+    if is_arm_field(twin.model.effects[index]):
+        return _told_field(twin.model.effects[index], holdout_gain_px)
     fitted = _fitted(twin, index)
     law = law_of(fitted.present)
     swings = law.form.key == "periodic"
@@ -67,6 +71,24 @@ def told_law(
         parameters=_swinging(law, fitted) if swings else _as_they_are(law, fitted),
         holdout_gain_px=holdout_gain_px,
         rivals=rivals,
+    )
+
+
+def _told_field(present: Present, holdout_gain_px: float) -> FoundLaw:
+    given, (size_m, size_rad) = present.as_mapping(), rms(present)
+    along = str(present.effect.law).partition("/")[2]
+    return FoundLaw(
+        form="field",
+        equation=f"{present.effect.equation}, over the {along}",
+        covariates=(along,),
+        parameters={
+            "rms_m": Value(size_m, 0.0, "m"),
+            "rms_rad": Value(size_rad, 0.0, "rad"),
+            "length_scale": Value(given["length_scale"], 0.0, "rad"),
+            "share_of_scatter": Value(given["share"], 0.0, "1"),
+        },
+        holdout_gain_px=holdout_gain_px,
+        rivals=(),
     )
 
 

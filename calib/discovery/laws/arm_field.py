@@ -1,0 +1,168 @@
+"""Whether the arm's scatter is a smooth field over its joints, and the field itself.
+
+The frames' own errors are compared by their marginal likelihood: scattering freely, or a share of
+their variance being alike in poses near to each other. All that is fitted (hand-eye, board,
+camera) is integrated out.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.stats import chi2
+
+from calib.chain.effect import Present
+from calib.chain.laws.arm_field import FIELD, coordinates, likeness, over, present_field
+from calib.discovery.laws.frames import FrameNormals, frame_normals
+from calib.discovery.locate import Cell
+from calib.discovery.score import Score
+from calib.discovery.search import Search
+from calib.solver.joint import JointFit
+from calib.views import FloatArray, Views
+
+_LENGTHS = (0.15, 0.3, 0.6, 1.2, 2.4)
+_SHARES = (0.3, 0.6, 0.8, 0.95)
+_SIZES = (0.7, 1.0, 1.5)
+_WORTH = 14.0
+"""By which a field must lower -2 log likelihood: 0.001 for three numbers, and their choice."""
+
+_REPEATABLE_M, _REPEATABLE_RAD = 4e-4, 1e-3
+"""No industrial arm scatters so much about a pose it returns to: ISO 9283 figures of arms up to
+2 m reach are 0.01 to 0.1 mm. What is more errs alike when it comes back."""
+
+_FEWEST_FRAMES, _MOST_FRAMES = 12, 80
+"""Of more frames every so many are compared: the field's size and length show in these."""
+
+
+@dataclass(frozen=True)
+class ArmField:
+    """A field and what it gains in -2 log likelihood over free scatter."""
+
+    present: Present
+    gain: float
+
+
+class _Scatter:
+    """The frames' own errors as far as the pictures tell them, in units of the noise."""
+
+    def __init__(self, fit: JointFit, views: Views) -> None:
+        self.unit = np.array([fit.noise.flange_m] * 3 + [fit.noise.flange_rad] * 3)
+        normals = frame_normals(fit, views)
+        scale = fit.noise.corner_px**-2.0
+        self.places = coordinates(views, over(views))
+        self._measured(normals, fit, scale)
+
+    def _measured(self, normals: FrameNormals, fit: JointFit, scale: float) -> None:
+        own = normals.own * scale * self.unit[:, None] * self.unit[None, :]
+        cross = normals.cross * scale * self.unit[:, None]
+        pulled = normals.own_residual * scale * self.unit
+        self.noise = np.linalg.inv(own)
+        back = self.noise @ cross
+        n, f, t = cross.shape
+        self.error = (
+            fit.own_error / self.unit + np.einsum("nij,nj->ni", self.noise, pulled)
+        ).ravel()
+        self.design = back.reshape(n * f, t)
+        self.information = np.diag(normals.prior) + scale * normals.shared.sum(axis=0)
+        self.information -= np.einsum("nft,nfs->ts", cross, back)
+        self.gradient = normals.pull + scale * normals.gradient.sum(axis=0)
+        self.gradient -= np.einsum("nft,nf->t", back, pulled)
+
+    def thinned(self) -> _Scatter:
+        """Every so many of the frames; what the pictures say of the shared numbers stays."""
+        every = -(-len(self.places) // _MOST_FRAMES)
+        few = copy(self)
+        few.places, few.noise = self.places[::every], self.noise[::every]
+        few.error = self.error.reshape(-1, 6)[::every].ravel()
+        design = self.design.reshape(len(self.places), 6, -1)[::every]
+        few.design = design.reshape(-1, design.shape[2])
+        return few
+
+    def judged(self, alike: FloatArray, share: float, size: float) -> tuple[float, FloatArray]:
+        """-2 log likelihood but for a constant, and (N, 6) weights of the field."""
+        n = len(self.places)
+        spread = size * (share * alike + (1.0 - share) * np.eye(n))
+        covariance = np.kron(spread, np.eye(6))
+        for k in range(n):
+            covariance[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] += self.noise[k]
+        factor = cho_factor(covariance, lower=True)
+        solved = cho_solve(factor, np.column_stack([self.error, self.design]))
+        information = self.information + self.design.T @ solved[:, 1:]
+        right = self.gradient + self.design.T @ solved[:, 0]
+        unit = 1.0 / np.sqrt(np.diag(information))
+        normal = information * unit[:, None] * unit[None, :]
+        step = unit * np.linalg.lstsq(normal, unit * right, rcond=1e-10)[0]
+        log_det = 2.0 * float(np.log(np.diag(factor[0])).sum())
+        value = np.linalg.eigvalsh(normal)
+        log_det += float(np.log(value[value > 1e-10]).sum() - 2.0 * np.log(unit).sum())
+        quadratic = float(self.error @ solved[:, 0] - right @ step)
+        weights = size * share * (solved[:, 0] - solved[:, 1:] @ step)
+        return log_det + quadratic, weights.reshape(n, 6) * self.unit
+
+
+def find_arm_field(fit: JointFit, views: Views) -> ArmField | None:
+    """The field that the arm's errors demand; None where they scatter freely, and little."""
+    if len(views) < _FEWEST_FRAMES or fit.own_error.shape[1] != 6:
+        return None
+    whole = _Scatter(fit, views)
+    scatter = whole.thinned()
+    free = min(scatter.judged(np.eye(len(scatter.places)), 0.0, size)[0] for size in _SIZES)
+    tries = [
+        (scatter.judged(likeness(scatter.places, scatter.places, length), share, size)[0], *rest)
+        for length in _LENGTHS
+        for share in _SHARES
+        for size in _SIZES
+        for rest in [(length, share, size)]
+    ]
+    too_much = fit.noise.flange_m > _REPEATABLE_M or fit.noise.flange_rad > _REPEATABLE_RAD
+    if min(tries)[0] > free - _WORTH:
+        if not too_much:
+            return None
+        tries = [one for one in tries if one[2] == max(_SHARES)]
+    reached, length, share, size = min(tries)
+    return ArmField(_made(whole, views, length, share, size), free - reached)
+
+
+def _made(scatter: _Scatter, views: Views, length: float, share: float, size: float) -> Present:
+    alike = likeness(scatter.places, scatter.places, length)
+    _, weights = scatter.judged(alike, share, size)
+    return present_field(over(views), scatter.places, weights, length, share)
+
+
+def made_anew(fit: JointFit, views: Views, known: Present) -> Present:
+    """The field of the same length scale and share for other frames, from a fit without it."""
+    given = known.as_mapping()
+    return _made(_Scatter(fit, views), views, given["length_scale"], given["share"], 1.0)
+
+
+def is_arm_field(present: Present) -> bool:
+    """Whether an effect is such a field."""
+    return present.effect.law is not None and present.effect.law.startswith(FIELD)
+
+
+def with_arm_field(search: Search) -> list[Cell]:
+    """Put a field of the arm into the cell where its errors demand one; its cell."""
+    fit = search.best.fit
+    if not search.fitter.has_robot:
+        return []
+    found = find_arm_field(fit, search.views)
+    if found is None:
+        return []
+    search.go_on_from(search.fitter.with_effects(fit, (*fit.model.effects, found.present)))
+    p_value = float(chi2.sf(max(found.gain, 0.0), 3))
+    length = found.present.as_mapping()["length_scale"]
+    return [
+        Cell(
+            site="flange_pose",
+            link="arm",
+            covariate=over(search.views),
+            score=Score(found.gain, 3, p_value, np.zeros(0)),
+            tried=1,
+            curve=None,
+            where=f"everywhere, alike within about {length:.2g} rad",
+            law=found.present,
+        )
+    ]
