@@ -5,6 +5,9 @@ Equation 1 of the paper with Brown's distortion (Brown 1966; the rational, thin-
 forms as in OpenCV's `calib3d` documentation), an entrance pupil that moves with the field angle,
 a plane-parallel window, and a rolling shutter. A pose is perturbed on the camera's side:
 `camera_from_board <- (1 + increment) camera_from_board`, increment = (metres, radians).
+
+Corners go through in blocks, each quantity in a row of its own: straight loops over rows at a fixed
+distance are what LLVM turns into instructions for four or eight corners at once.
 """
 
 from __future__ import annotations
@@ -19,238 +22,318 @@ from calib.views import FloatArray
 
 K = len(OPTICS)
 NOTHING, BROWN, EVERYTHING = 0, 1, 2
-"""Which derivatives a corner's walk gives: none; by the pose and the columns up to the thin prism;
-by every column. The rare ones (tilt, pupil, window, sweep) cost more than all others together."""
+"""Which derivatives a block gives: none; by the pose and the columns up to the thin prism; by every
+column. The rare ones (tilt, pupil, window, sweep) cost more than all others together."""
 
 FIRST_RARE, LAST_RARE = COLUMN["tilt_x_rad"], COLUMN["sweep_rz_rad"]
 FIRST_SWEEP, HEIGHT, POSE_ROW = COLUMN["sweep_x_m"], COLUMN["height_px"], COLUMN["pose_row"]
 ROW_STEPS, ROW_SETTLED_PX = 40, 1e-11
 """A board that moves by a tenth of the picture while it is read needs about a dozen steps."""
 
-UNIT = np.eye(4)
 N2 = WINDOW_INDEX * WINDOW_INDEX
 
+BLOCK = 64
+"""Corners that go through together: their rows stay in the fastest cache."""
+LANES = 8
+"""Corners that an instruction may take at once; blocks are filled up to a multiple of it."""
+# rows of a block's `work`: the point in the board's frame, in the camera's, there with the board
+# at rest; its depth as the pinhole sees it, with derivatives by x, y, z, pupil and window; the
+# pixel; how late its row is read; the pixel's derivatives by the depth; the distorted point
+PX, PY, PZ, X, Y, Z, RX, RY, RZ, ZS, S0, S1, S2, S3, S4, U, V, LATE, US, VS, XD, YD = (
+    BLOCK * k for k in range(22)
+)
+WORK = 22 * BLOCK
+# rows of its derivatives `jac`, by the pose and by the optics: of u in the first half, of v in the
+# second
+ROW = 2 * BLOCK
+OPTIC = 6 * ROW
+JAC = (6 + K) * ROW
+
 
 @njit(cache=True, error_model="numpy")
-def _axial_shift(o, x, y, z, out, derive):  # type: ignore[no-untyped-def]
-    """Depth seen by the pinhole, and its derivatives by x, y, z, pupil and window into `out`."""
-    rho2 = x * x + y * y
-    out[:] = 0.0
-    out[2] = 1.0
-    if o[19] == 0.0 and o[20] == 0.0:
-        if derive != EVERYTHING:
-            return z
-        rho2_z2 = rho2 + z * z
-        cos = z / math.sqrt(rho2_z2)
-        theta = math.atan2(math.sqrt(rho2), z)
-        out[3] = theta * theta
-        out[4] = -(1.0 - cos / math.sqrt(N2 - 1.0 + cos * cos))
-        return z
-    rho = math.sqrt(rho2)
+def _axial_shift(pupil, window, x, y, z):  # type: ignore[no-untyped-def]
+    """Depth seen by the pinhole, and its derivatives by x, y, z, pupil and window."""
+    rho = math.sqrt(x * x + y * y)
     theta = math.atan2(rho, z)
-    d2 = rho2 + z * z
+    d2 = x * x + y * y + z * z
     cos = z / math.sqrt(d2)
     root = math.sqrt(N2 - 1.0 + cos * cos)
-    shift = o[19] * theta * theta - o[20] * (1.0 - cos / root)
+    by_window = -(1.0 - cos / root)
     # d(theta) = (z drho - rho dz)/d2 ; d(cos/root)/dcos = (N2 - 1)/root^3
-    slope = 2.0 * o[19] * theta - o[20] * (N2 - 1.0) / root**3 * math.sin(theta)
-    if rho > 0.0:
-        out[0] = slope * z / d2 * x / rho
-        out[1] = slope * z / d2 * y / rho
-    out[2] = 1.0 - slope * rho / d2
-    out[3] = theta * theta
-    out[4] = -(1.0 - cos / root)
-    return z + shift
+    slope = 2.0 * pupil * theta - window * (N2 - 1.0) / root**3 * math.sin(theta)
+    aside = slope * z / d2 / rho if rho > 0.0 else 0.0
+    depth = z + pupil * theta * theta + window * by_window
+    return depth, aside * x, aside * y, 1.0 - slope * rho / d2, theta * theta, by_window
 
 
-@njit(cache=True, error_model="numpy")
-def _tilt_of(o, tilt):  # type: ignore[no-untyped-def]
-    """Cosines and sines of a frame's sensor tilt into `tilt[0:4]`."""
-    tilt[0], tilt[1] = math.cos(o[17]), math.sin(o[17])
-    tilt[2], tilt[3] = math.cos(o[18]), math.sin(o[18])
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _place(pose, count, work):  # type: ignore[no-untyped-def]
+    """The corners in the camera's frame."""
+    r00, r01, r02, tx = pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3]
+    r10, r11, r12, ty = pose[1, 0], pose[1, 1], pose[1, 2], pose[1, 3]
+    r20, r21, r22, tz = pose[2, 0], pose[2, 1], pose[2, 2], pose[2, 3]
+    for j in range(count):
+        px, py, pz = work[PX + j], work[PY + j], work[PZ + j]
+        work[X + j] = r00 * px + r01 * py + r02 * pz + tx
+        work[Y + j] = r10 * px + r11 * py + r12 * pz + ty
+        work[Z + j] = r20 * px + r21 * py + r22 * pz + tz
 
 
-@njit(cache=True, error_model="numpy")
-def _tilted(tilt, xd, yd, j):  # type: ignore[no-untyped-def]
-    """Point on the tilted sensor; its 2x2 derivative by (xd, yd) into `j[0:4]`.
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _depth(o, count, work, derive):  # type: ignore[no-untyped-def]
+    """The depth that the pinhole sees."""
+    pupil, window = o[19], o[20]
+    if pupil == 0.0 and window == 0.0 and derive != EVERYTHING:
+        for j in range(count):
+            work[ZS + j] = work[Z + j]
+            work[S0 + j] = 0.0
+            work[S1 + j] = 0.0
+            work[S2 + j] = 1.0
+        return
+    for j in range(count):
+        seen = _axial_shift(pupil, window, work[X + j], work[Y + j], work[Z + j])
+        work[ZS + j], work[S0 + j], work[S1 + j], work[S2 + j], work[S3 + j], work[S4 + j] = seen
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _tilted(cx, sx, cy, sy, xd, yd):  # type: ignore[no-untyped-def]
+    """Point on the tilted sensor; one over its depth there.
 
     OpenCV's tilted-sensor homography, multiplied out.
     """
-    cx, sx, cy, sy = tilt[0], tilt[1], tilt[2], tilt[3]
-    w = sy * xd - cy * sx * yd + cy * cx
-    a = cx * xd / w
-    b = (cy * yd - sx * sy * xd) / w
-    j[0] = (cx - a * sy) / w
-    j[1] = a * cy * sx / w
-    j[2] = -(sx * sy + b * sy) / w
-    j[3] = (cy + b * cy * sx) / w
-    return a, b
+    per_w = 1.0 / (sy * xd - cy * sx * yd + cy * cx)
+    return cx * xd * per_w, (cy * yd - sx * sy * xd) * per_w, per_w
 
 
-# One straight run of assignments: split, numba would pass every intermediate through arrays.
-@njit(cache=True, error_model="numpy")
-def _corner(o, tilt, pose, px, py, pz, uv, j_pose, j_optics, shift, jt, derive):  # type: ignore[no-untyped-def]  # noqa: PLR0915
-    """One corner of a board at rest: pixel into `uv`; Jacobians by `derive` into (2, 6), (2, K).
-
-    `tilt` is the frame's, from `_tilt_of`. The rare columns' derivatives need `EVERYTHING`.
-    """
-    x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
-    y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
-    z = pose[2, 0] * px + pose[2, 1] * py + pose[2, 2] * pz + pose[2, 3]
-    zs = _axial_shift(o, x, y, z, shift, derive)
-    a = x / zs
-    b = y / zs
+@njit(cache=True, error_model="numpy", inline="always")
+def _distorted(a, b, k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4):  # type: ignore[no-untyped-def]
+    """A distorted point; its radial factor and the inverse of that one's denominator."""
     r2 = a * a + b * b
     r4 = r2 * r2
     r6 = r4 * r2
-    num = 1.0 + o[5] * r2 + o[6] * r4 + o[9] * r6
-    den = 1.0 + o[10] * r2 + o[11] * r4 + o[12] * r6
-    rad = num / den
-    xd = a * rad + 2.0 * o[7] * a * b + o[8] * (r2 + 2.0 * a * a) + o[13] * r2 + o[14] * r4
-    yd = b * rad + o[7] * (r2 + 2.0 * b * b) + 2.0 * o[8] * a * b + o[15] * r2 + o[16] * r4
-    tilted = o[17] != 0.0 or o[18] != 0.0
-    xt, yt = xd, yd
-    jt[0], jt[1], jt[2], jt[3] = 1.0, 0.0, 0.0, 1.0
-    if tilted:
-        xt, yt = _tilted(tilt, xd, yd, jt)
-    uv[0] = o[0] * xt + o[2] * yt + o[3]
-    uv[1] = o[1] * yt + o[4]
-    if derive == NOTHING:
-        return
-    # pixel by (xd, yd)
-    ux = o[0] * jt[0] + o[2] * jt[2]
-    uy = o[0] * jt[1] + o[2] * jt[3]
-    vx = o[1] * jt[2]
-    vy = o[1] * jt[3]
-    # (xd, yd) by (a, b)
-    num_r = o[5] + 2.0 * o[6] * r2 + 3.0 * o[9] * r4
-    den_r = o[10] + 2.0 * o[11] * r2 + 3.0 * o[12] * r4
-    rad_r = (num_r - rad * den_r) / den
-    prism_x = o[13] + 2.0 * o[14] * r2
-    prism_y = o[15] + 2.0 * o[16] * r2
-    xa = rad + 2.0 * a * a * rad_r + 2.0 * o[7] * b + 6.0 * o[8] * a + 2.0 * a * prism_x
-    xb = 2.0 * a * b * rad_r + 2.0 * o[7] * a + 2.0 * o[8] * b + 2.0 * b * prism_x
-    ya = 2.0 * a * b * rad_r + 2.0 * o[7] * a + 2.0 * o[8] * b + 2.0 * a * prism_y
-    yb = rad + 2.0 * b * b * rad_r + 6.0 * o[7] * b + 2.0 * o[8] * a + 2.0 * b * prism_y
-    ua = ux * xa + uy * ya
-    ub = ux * xb + uy * yb
-    va = vx * xa + vy * ya
-    vb = vx * xb + vy * yb
-    # (a, b) by zs is -(a, b)/zs
-    us = -(ua * a + ub * b) / zs
-    vs = -(va * a + vb * b) / zs
-    u_x = ua / zs + us * shift[0]
-    u_y = ub / zs + us * shift[1]
-    u_z = us * shift[2]
-    v_x = va / zs + vs * shift[0]
-    v_y = vb / zs + vs * shift[1]
-    v_z = vs * shift[2]
-    j_pose[0, 0], j_pose[0, 1], j_pose[0, 2] = u_x, u_y, u_z
-    j_pose[1, 0], j_pose[1, 1], j_pose[1, 2] = v_x, v_y, v_z
-    j_pose[0, 3] = -u_y * z + u_z * y
-    j_pose[0, 4] = u_x * z - u_z * x
-    j_pose[0, 5] = -u_x * y + u_y * x
-    j_pose[1, 3] = -v_y * z + v_z * y
-    j_pose[1, 4] = v_x * z - v_z * x
-    j_pose[1, 5] = -v_x * y + v_y * x
-    j_optics[:, :] = 0.0
-    j_optics[0, 0] = xt
-    j_optics[1, 1] = yt
-    j_optics[0, 2] = yt
-    j_optics[0, 3] = 1.0
-    j_optics[1, 4] = 1.0
-    for column, dx, dy in (
-        (5, a * r2 / den, b * r2 / den),
-        (6, a * r4 / den, b * r4 / den),
-        (7, 2.0 * a * b, r2 + 2.0 * b * b),
-        (8, r2 + 2.0 * a * a, 2.0 * a * b),
-        (9, a * r6 / den, b * r6 / den),
-        (10, -a * rad * r2 / den, -b * rad * r2 / den),
-        (11, -a * rad * r4 / den, -b * rad * r4 / den),
-        (12, -a * rad * r6 / den, -b * rad * r6 / den),
-        (13, r2, 0.0),
-        (14, r4, 0.0),
-        (15, 0.0, r2),
-        (16, 0.0, r4),
-    ):
-        j_optics[0, column] = ux * dx + uy * dy
-        j_optics[1, column] = vx * dx + vy * dy
-    if derive != EVERYTHING:
-        return
-    _tilt_derivative(o, tilt, xd, yd, xt, yt, j_optics)
-    j_optics[0, 19] = us * shift[3]
-    j_optics[1, 19] = vs * shift[3]
-    j_optics[0, 20] = us * shift[4]
-    j_optics[1, 20] = vs * shift[4]
-    late = uv[1] / o[HEIGHT] - 0.5 - o[POSE_ROW]
+    per_den = 1.0 / (1.0 + k4 * r2 + k5 * r4 + k6 * r6)
+    rad = (1.0 + k1 * r2 + k2 * r4 + k3 * r6) * per_den
+    xd = a * rad + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a) + s1 * r2 + s2 * r4
+    yd = b * rad + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b + s3 * r2 + s4 * r4
+    return xd, yd, rad, per_den
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _see(o, count, work):  # type: ignore[no-untyped-def]
+    """Pixels of corners in the camera's frame."""
+    alpha, beta, skew, u0, v0 = o[0], o[1], o[2], o[3], o[4]
+    k1, k2, p1, p2, k3, k4, k5, k6 = o[5], o[6], o[7], o[8], o[9], o[10], o[11], o[12]
+    s1, s2, s3, s4 = o[13], o[14], o[15], o[16]
+    cx, sx, cy, sy = math.cos(o[17]), math.sin(o[17]), math.cos(o[18]), math.sin(o[18])
+    for j in range(count):
+        per_z = 1.0 / work[ZS + j]
+        a, b = work[X + j] * per_z, work[Y + j] * per_z
+        xd, yd, _, _ = _distorted(a, b, k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4)
+        xt, yt, _ = _tilted(cx, sx, cy, sy, xd, yd)
+        work[U + j] = alpha * xt + skew * yt + u0
+        work[V + j] = beta * yt + v0
+
+
+# One straight run of assignments in one loop, so that all of it goes several corners at a time.
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _differentiate(o, count, work, jac):  # type: ignore[no-untyped-def]  # noqa: PLR0915
+    """Pixels, and their derivatives by the pose and by the columns up to the thin prism."""
+    alpha, beta, skew, u0, v0 = o[0], o[1], o[2], o[3], o[4]
+    k1, k2, p1, p2, k3, k4, k5, k6 = o[5], o[6], o[7], o[8], o[9], o[10], o[11], o[12]
+    s1, s2, s3, s4 = o[13], o[14], o[15], o[16]
+    cx, sx, cy, sy = math.cos(o[17]), math.sin(o[17]), math.cos(o[18]), math.sin(o[18])
+    for j in range(count):
+        x, y, z = work[X + j], work[Y + j], work[Z + j]
+        per_z = 1.0 / work[ZS + j]
+        a, b = x * per_z, y * per_z
+        xd, yd, rad, per_den = _distorted(a, b, k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4)
+        xt, yt, per_w = _tilted(cx, sx, cy, sy, xd, yd)
+        work[U + j] = alpha * xt + skew * yt + u0
+        work[V + j] = beta * yt + v0
+        # pixel by (xd, yd)
+        t10, t11 = -(sx * sy + yt * sy) * per_w, (cy + yt * cy * sx) * per_w
+        ux = alpha * (cx - xt * sy) * per_w + skew * t10
+        uy = alpha * xt * cy * sx * per_w + skew * t11
+        vx, vy = beta * t10, beta * t11
+        # (xd, yd) by (a, b)
+        r2 = a * a + b * b
+        r4 = r2 * r2
+        num_r = k1 + 2.0 * k2 * r2 + 3.0 * k3 * r4
+        den_r = k4 + 2.0 * k5 * r2 + 3.0 * k6 * r4
+        rad_r = (num_r - rad * den_r) * per_den
+        prism_x, prism_y = s1 + 2.0 * s2 * r2, s3 + 2.0 * s4 * r2
+        cross = 2.0 * a * b * rad_r + 2.0 * p1 * a + 2.0 * p2 * b
+        xa = rad + 2.0 * a * a * rad_r + 2.0 * p1 * b + 6.0 * p2 * a + 2.0 * a * prism_x
+        xb = cross + 2.0 * b * prism_x
+        ya = cross + 2.0 * a * prism_y
+        yb = rad + 2.0 * b * b * rad_r + 6.0 * p1 * b + 2.0 * p2 * a + 2.0 * b * prism_y
+        ua, ub = ux * xa + uy * ya, ux * xb + uy * yb
+        va, vb = vx * xa + vy * ya, vx * xb + vy * yb
+        # (a, b) by the depth is -(a, b)/depth
+        us, vs = -(ua * a + ub * b) * per_z, -(va * a + vb * b) * per_z
+        dx, dy, dz = work[S0 + j], work[S1 + j], work[S2 + j]
+        u_x, u_y, u_z = ua * per_z + us * dx, ub * per_z + us * dy, us * dz
+        v_x, v_y, v_z = va * per_z + vs * dx, vb * per_z + vs * dy, vs * dz
+        work[US + j], work[VS + j], work[XD + j], work[YD + j] = us, vs, xd, yd
+        for h, gx, gy, gz in ((0, u_x, u_y, u_z), (BLOCK, v_x, v_y, v_z)):
+            jac[h + j] = gx
+            jac[ROW + h + j] = gy
+            jac[2 * ROW + h + j] = gz
+            jac[3 * ROW + h + j] = gz * y - gy * z
+            jac[4 * ROW + h + j] = gx * z - gz * x
+            jac[5 * ROW + h + j] = gy * x - gx * y
+        for h, at_x, at_y in ((0, ux, uy), (BLOCK, vx, vy)):
+            r6 = r4 * r2
+            radial = (at_x * a + at_y * b) * per_den
+            at = OPTIC + h + j
+            jac[at + 5 * ROW] = radial * r2
+            jac[at + 6 * ROW] = radial * r4
+            jac[at + 7 * ROW] = at_x * 2.0 * a * b + at_y * (r2 + 2.0 * b * b)
+            jac[at + 8 * ROW] = at_x * (r2 + 2.0 * a * a) + at_y * 2.0 * a * b
+            jac[at + 9 * ROW] = radial * r6
+            jac[at + 10 * ROW] = -radial * rad * r2
+            jac[at + 11 * ROW] = -radial * rad * r4
+            jac[at + 12 * ROW] = -radial * rad * r6
+            jac[at + 13 * ROW] = at_x * r2
+            jac[at + 14 * ROW] = at_x * r4
+            jac[at + 15 * ROW] = at_y * r2
+            jac[at + 16 * ROW] = at_y * r4
+        at = OPTIC + j
+        jac[at] = xt
+        jac[at + BLOCK] = 0.0
+        jac[at + ROW] = 0.0
+        jac[at + ROW + BLOCK] = yt
+        jac[at + 2 * ROW] = yt
+        jac[at + 2 * ROW + BLOCK] = 0.0
+        jac[at + 3 * ROW] = 1.0
+        jac[at + 3 * ROW + BLOCK] = 0.0
+        jac[at + 4 * ROW] = 0.0
+        jac[at + 4 * ROW + BLOCK] = 1.0
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _differentiate_rare(o, count, work, jac):  # type: ignore[no-untyped-def]
+    """Derivatives by the sensor's tilt, pupil, window, and the sweep of a board at rest."""
+    alpha, beta, skew = o[0], o[1], o[2]
+    cx, sx, cy, sy = math.cos(o[17]), math.sin(o[17]), math.cos(o[18]), math.sin(o[18])
+    per_height, late_at_top = 1.0 / o[HEIGHT], -0.5 - o[POSE_ROW]
+    for j in range(count):
+        xd, yd, at = work[XD + j], work[YD + j], OPTIC + j
+        xt, yt = jac[at], jac[at + 2 * ROW]
+        per_w = 1.0 / (sy * xd - cy * sx * yd + cy * cx)
+        by_x = -(cy * cx * yd + cy * sx)
+        dx = -(sx * xd + xt * by_x) * per_w
+        dy = -(cx * sy * xd + yt * by_x) * per_w
+        jac[at + 17 * ROW] = alpha * dx + skew * dy
+        jac[at + 17 * ROW + BLOCK] = beta * dy
+        by_y = cy * xd + sy * sx * yd - sy * cx
+        dx = -xt * by_y * per_w
+        dy = -(sy * yd + sx * cy * xd + yt * by_y) * per_w
+        jac[at + 18 * ROW] = alpha * dx + skew * dy
+        jac[at + 18 * ROW + BLOCK] = beta * dy
+        jac[at + 19 * ROW] = work[US + j] * work[S3 + j]
+        jac[at + 19 * ROW + BLOCK] = work[VS + j] * work[S3 + j]
+        jac[at + 20 * ROW] = work[US + j] * work[S4 + j]
+        jac[at + 20 * ROW + BLOCK] = work[VS + j] * work[S4 + j]
+        work[LATE + j] = work[V + j] * per_height + late_at_top
     for k in range(6):
-        j_optics[0, FIRST_SWEEP + k] = j_pose[0, k] * late
-        j_optics[1, FIRST_SWEEP + k] = j_pose[1, k] * late
+        for j in range(count):
+            late = work[LATE + j]
+            jac[OPTIC + (FIRST_SWEEP + k) * ROW + j] = jac[k * ROW + j] * late
+            jac[OPTIC + (FIRST_SWEEP + k) * ROW + BLOCK + j] = jac[k * ROW + BLOCK + j] * late
 
 
 @njit(cache=True, error_model="numpy")
-def _tilt_derivative(o, tilt, xd, yd, xt, yt, j_optics):  # type: ignore[no-untyped-def]
-    cx, sx, cy, sy = tilt[0], tilt[1], tilt[2], tilt[3]
-    w = sy * xd - cy * sx * yd + cy * cx
-    by_x = -(cy * cx * yd + cy * sx)
-    dx = -(sx * xd + xt * by_x) / w
-    dy = -(cx * sy * xd + yt * by_x) / w
-    j_optics[0, 17] = o[0] * dx + o[2] * dy
-    j_optics[1, 17] = o[1] * dy
-    by_y = cy * xd + sy * sx * yd - sy * cx
-    dx = -xt * by_y / w
-    dy = -(sy * yd + sx * cy * xd + yt * by_y) / w
-    j_optics[0, 18] = o[0] * dx + o[2] * dy
-    j_optics[1, 18] = o[1] * dy
+def _follow_rows(o, count, work):  # type: ignore[no-untyped-def]
+    """Corners of a board that moves on, as they are when their own rows are read.
 
-
-@njit(cache=True, error_model="numpy")
-def _swept(o, tilt, pose, px, py, pz, uv, j_pose, j_optics, shift, jt, derive):  # type: ignore[no-untyped-def]
-    """`_corner` of a board that moves on: the corner as it is when its own row is read.
-
-    `uv` holds where it is seen at rest. The row is found by stepping to where the corner is when
-    the row before is read; the derivatives are those of the implicit equation. Within a frame the
-    corner goes straight on.
+    The rows are found by stepping to where the corners are when the rows before are read. Within a
+    frame a corner goes straight on.
     """
-    x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
-    y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
-    z = pose[2, 0] * px + pose[2, 1] * py + pose[2, 2] * pz + pose[2, 3]
     tx, ty, tz, rx, ry, rz = o[21], o[22], o[23], o[24], o[25], o[26]
-    mx, my, mz = tx + ry * z - rz * y, ty + rz * x - rx * z, tz + rx * y - ry * x
-    late = 0.0
+    for j in range(count):
+        work[RX + j], work[RY + j], work[RZ + j] = work[X + j], work[Y + j], work[Z + j]
     for _ in range(ROW_STEPS):
-        row = uv[1]
-        late = row / o[HEIGHT] - 0.5 - o[POSE_ROW]
-        xs, ys, zs = x + late * mx, y + late * my, z + late * mz
-        _corner(o, tilt, UNIT, xs, ys, zs, uv, j_pose, j_optics, shift, jt, NOTHING)
-        if abs(uv[1] - row) < ROW_SETTLED_PX:
+        moved_px = 0.0
+        for j in range(count):
+            x, y, z = work[RX + j], work[RY + j], work[RZ + j]
+            late = work[V + j] / o[HEIGHT] - 0.5 - o[POSE_ROW]
+            work[X + j] = x + late * (tx + ry * z - rz * y)
+            work[Y + j] = y + late * (ty + rz * x - rx * z)
+            work[Z + j] = z + late * (tz + rx * y - ry * x)
+            work[LATE + j] = late
+            work[PX + j] = work[V + j]
+        _depth(o, count, work, BROWN)
+        _see(o, count, work)
+        for j in range(count):
+            moved_px = max(moved_px, abs(work[V + j] - work[PX + j]))
+        if moved_px < ROW_SETTLED_PX:
             break
-    if derive == NOTHING:
-        return
-    _corner(o, tilt, UNIT, xs, ys, zs, uv, j_pose, j_optics, shift, jt, derive)
-    by_row = np.empty(2)
-    for i in range(2):
-        gx, gy, gz = j_pose[i, 0], j_pose[i, 1], j_pose[i, 2]
-        by_row[i] = (gx * mx + gy * my + gz * mz) / o[HEIGHT]
-        qx = gx + late * (gy * rz - gz * ry)
-        qy = gy + late * (gz * rx - gx * rz)
-        qz = gz + late * (gx * ry - gy * rx)
-        j_pose[i, 0], j_pose[i, 1], j_pose[i, 2] = qx, qy, qz
-        j_pose[i, 3], j_pose[i, 4], j_pose[i, 5] = y * qz - z * qy, z * qx - x * qz, x * qy - y * qx
-        j_optics[i, 21], j_optics[i, 22], j_optics[i, 23] = late * gx, late * gy, late * gz
-        j_optics[i, 24] = late * (y * gz - z * gy)
-        j_optics[i, 25] = late * (z * gx - x * gz)
-        j_optics[i, 26] = late * (x * gy - y * gx)
-    # a corner seen lower is read later, and has moved on by then
-    for j in (j_pose, j_optics):
-        j[1] /= 1.0 - by_row[1]
-        j[0] += by_row[0] * j[1]
 
 
 @njit(cache=True, error_model="numpy")
-def _has_sweep(o):  # type: ignore[no-untyped-def]
-    """Whether the board moves while this frame's rows are read."""
-    return np.any(o[FIRST_SWEEP : LAST_RARE + 1] != 0.0)
+def _differentiate_moving(o, count, work, jac):  # type: ignore[no-untyped-def]
+    """Derivatives of `_follow_rows`, from those at the moved corners: of an implicit equation."""
+    tx, ty, tz, rx, ry, rz = o[21], o[22], o[23], o[24], o[25], o[26]
+    sweep = OPTIC + FIRST_SWEEP * ROW
+    by_row = np.empty(2)
+    for j in range(count):
+        x, y, z, late = work[RX + j], work[RY + j], work[RZ + j], work[LATE + j]
+        mx, my, mz = tx + ry * z - rz * y, ty + rz * x - rx * z, tz + rx * y - ry * x
+        for i in range(2):
+            at = i * BLOCK + j
+            gx, gy, gz = jac[at], jac[at + ROW], jac[at + 2 * ROW]
+            by_row[i] = (gx * mx + gy * my + gz * mz) / o[HEIGHT]
+            qx = gx + late * (gy * rz - gz * ry)
+            qy = gy + late * (gz * rx - gx * rz)
+            qz = gz + late * (gx * ry - gy * rx)
+            jac[at], jac[at + ROW], jac[at + 2 * ROW] = qx, qy, qz
+            jac[at + 3 * ROW] = y * qz - z * qy
+            jac[at + 4 * ROW] = z * qx - x * qz
+            jac[at + 5 * ROW] = x * qy - y * qx
+            at += sweep
+            jac[at], jac[at + ROW], jac[at + 2 * ROW] = late * gx, late * gy, late * gz
+            jac[at + 3 * ROW] = late * (y * gz - z * gy)
+            jac[at + 4 * ROW] = late * (z * gx - x * gz)
+            jac[at + 5 * ROW] = late * (x * gy - y * gx)
+        # a corner seen lower is read later, and has moved on by then
+        for at in range(j, JAC, ROW):
+            jac[at + BLOCK] /= 1.0 - by_row[1]
+            jac[at] += by_row[0] * jac[at + BLOCK]
+
+
+@njit(cache=True, error_model="numpy")
+def _corners(o, pose, count, work, jac, derive):  # type: ignore[no-untyped-def]
+    """Project the `count` points in `work`; pixels go there, derivatives by `derive` into `jac`.
+
+    `count` must be a multiple of `LANES`. The rare columns' derivatives need `EVERYTHING`.
+    """
+    _place(pose, count, work)
+    _depth(o, count, work, derive)
+    if np.any(o[FIRST_SWEEP : LAST_RARE + 1] != 0.0):
+        _see(o, count, work)
+        _follow_rows(o, count, work)
+        if derive != NOTHING:
+            _depth(o, count, work, derive)
+            _differentiate(o, count, work, jac)
+            _differentiate_rare(o, count, work, jac)
+            _differentiate_moving(o, count, work, jac)
+    elif derive == NOTHING:
+        _see(o, count, work)
+    else:
+        _differentiate(o, count, work, jac)
+        if derive == EVERYTHING:
+            _differentiate_rare(o, count, work, jac)
+
+
+@njit(cache=True, error_model="numpy")
+def _take(points, chosen, count, work):  # type: ignore[no-untyped-def]
+    """Put points into a block; the last one fills it up to a multiple of `LANES`, returned."""
+    full = (count + LANES - 1) // LANES * LANES
+    for j in range(full):
+        at = chosen[min(j, count - 1)]
+        work[PX + j], work[PY + j], work[PZ + j] = points[at, 0], points[at, 1], points[at, 2]
+    return full
 
 
 @njit(cache=True, error_model="numpy")
@@ -261,24 +344,23 @@ def _has_rare(o):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _project_all(optics, poses, points, uv, j_pose, j_optics, derive):  # type: ignore[no-untyped-def]
-    shift = np.zeros(5)
-    tilt = np.zeros(4)
-    jt = np.zeros(4)
-    jp = np.zeros((2, 6))
-    jo = np.zeros((2, K))
+    work, jac = np.zeros(WORK), np.zeros(JAC)
+    need = EVERYTHING if derive else NOTHING
+    chosen = np.arange(points.shape[0])
     for i in range(poses.shape[0]):
-        o = optics[i]
-        _tilt_of(o, tilt)
-        need = EVERYTHING if derive else NOTHING
-        sweeps = _has_sweep(o)
-        for j in range(points.shape[0]):
-            p = points[j]
-            _corner(o, tilt, poses[i], p[0], p[1], p[2], uv[i, j], jp, jo, shift, jt, need)
-            if sweeps:
-                _swept(o, tilt, poses[i], p[0], p[1], p[2], uv[i, j], jp, jo, shift, jt, need)
+        for first in range(0, points.shape[0], BLOCK):
+            count = min(BLOCK, points.shape[0] - first)
+            full = _take(points, chosen[first:], count, work)
+            _corners(optics[i], poses[i], full, work, jac, need)
+            for j in range(count):
+                uv[i, first + j, 0], uv[i, first + j, 1] = work[U + j], work[V + j]
             if derive:
-                j_pose[i, j] = jp
-                j_optics[i, j] = jo
+                for j in range(count):
+                    for c in range(2):
+                        for k in range(6):
+                            j_pose[i, first + j, c, k] = jac[k * ROW + c * BLOCK + j]
+                        for k in range(K):
+                            j_optics[i, first + j, c, k] = jac[OPTIC + k * ROW + c * BLOCK + j]
 
 
 def project(optics: FloatArray, camera_from_board: FloatArray, points_m: FloatArray) -> FloatArray:

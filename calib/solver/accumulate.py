@@ -9,129 +9,171 @@ import numpy as np
 from numba import njit
 
 from calib.chain.projection import (
+    BLOCK,
     BROWN,
     EVERYTHING,
     FIRST_RARE,
+    JAC,
     LAST_RARE,
-    K,
-    _corner,
+    OPTIC,
+    ROW,
+    WORK,
+    U,
+    V,
+    _corners,
     _has_rare,
-    _has_sweep,
-    _swept,
-    _tilt_of,
+    _take,
 )
 from calib.views import FloatArray
 
-BLOCK = 64
-"""Corners whose derivatives are gathered before they are multiplied: they stay in the cache."""
+LEFT, RIGHT = 2, 4
+"""Rows whose products are summed together: each is read from the cache that much less often."""
 
 
+# Rows are taken as slices: an index that may be negative for all the compiler knows would keep it
+# from going several corners at a time.
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
-def _add_products(rows, count, gram):  # type: ignore[no-untyped-def]
-    """Add the products of (Q, count) rows to the upper triangle of `gram`, four at a time."""
-    q = rows.shape[0]
-    for a in range(q):
-        left = rows[a]
-        b = a
-        while b + 4 <= q:
-            first, second, third, fourth = rows[b], rows[b + 1], rows[b + 2], rows[b + 3]
-            s0 = 0.0
-            s1 = 0.0
-            s2 = 0.0
-            s3 = 0.0
-            for k in range(count):
-                s0 += left[k] * first[k]
-                s1 += left[k] * second[k]
-                s2 += left[k] * third[k]
-                s3 += left[k] * fourth[k]
-            gram[a, b] += s0
-            gram[a, b + 1] += s1
-            gram[a, b + 2] += s2
-            gram[a, b + 3] += s3
-            b += 4
-        while b < q:
-            right = rows[b]
-            s0 = 0.0
-            for k in range(count):
-                s0 += left[k] * right[k]
-            gram[a, b] += s0
-            b += 1
+def _add_products(rows, length, gram):  # type: ignore[no-untyped-def]
+    """Add the products of (Q, length) rows to the upper triangle of `gram`, by small tiles."""
+    last = rows.shape[0] - 1
+    for a in range(0, last + 1, LEFT):
+        a0, a1 = rows[a], rows[min(a + 1, last)]
+        for b in range(a, last + 1, RIGHT):
+            b0, b1 = rows[b], rows[min(b + 1, last)]
+            b2, b3 = rows[min(b + 2, last)], rows[min(b + 3, last)]
+            s00 = s01 = s02 = s03 = s10 = s11 = s12 = s13 = 0.0
+            for k in range(length):
+                s00 += a0[k] * b0[k]
+                s01 += a0[k] * b1[k]
+                s02 += a0[k] * b2[k]
+                s03 += a0[k] * b3[k]
+                s10 += a1[k] * b0[k]
+                s11 += a1[k] * b1[k]
+                s12 += a1[k] * b2[k]
+                s13 += a1[k] * b3[k]
+            sums = ((s00, s01, s02, s03), (s10, s11, s12, s13))
+            for i in range(min(LEFT, last + 1 - a)):
+                for j in range(min(RIGHT, last + 1 - b)):
+                    gram[a + i, b + j] += sums[i][j]
 
 
+@njit(cache=True, error_model="numpy")
+def _weigh(source, root, full, row):  # type: ignore[no-untyped-def]
+    """A row of derivatives times the roots of the weights: of u, and at once behind it of v."""
+    of_v, to_v = source[BLOCK:], row[full:]
+    for j in range(full):
+        row[j] = root[j] * source[j]
+    for j in range(full):
+        to_v[j] = root[j] * of_v[j]
+
+
+@njit(cache=True, error_model="numpy")
+def _by_point(jac, rotation, count, by_point):  # type: ignore[no-untyped-def]
+    """Derivatives by the point in the board's frame, a row for each of its axes."""
+    for k in range(3):
+        r0, r1, r2 = rotation[0, k], rotation[1, k], rotation[2, k]
+        for half in (0, BLOCK):
+            for j in range(half, half + count):
+                by_point[k * ROW + j] = r0 * jac[j] + r1 * jac[ROW + j] + r2 * jac[2 * ROW + j]
+
+
+@njit(cache=True, error_model="numpy")
+def _weigh_modes(by_point, basis, chosen, root, count, full, rows, to):  # type: ignore[no-untyped-def]
+    """Derivatives by the board's modes, weighted."""
+    for k in range(basis.shape[0]):
+        rows[to + k, : 2 * full] = 0.0
+        for c in range(2):
+            for j in range(count):
+                move, here = basis[k, chosen[j]], c * BLOCK + j
+                rows[to + k, c * full + j] = root[j] * (
+                    by_point[here] * move[0]
+                    + by_point[ROW + here] * move[1]
+                    + by_point[2 * ROW + here] * move[2]
+                )
+
+
+@njit(cache=True, error_model="numpy")
+def _add_corners(by_point, rows, chosen, root, count, full, cross, own):  # type: ignore[no-untyped-def]
+    """Products with each corner's own in-plane shift; `rows` carry the root of its weight."""
+    for j in range(count):
+        to_cross, to_own = cross[chosen[j]], own[chosen[j]]
+        for a in range(2):
+            u, v = root[j] * by_point[a * ROW + j], root[j] * by_point[a * ROW + BLOCK + j]
+            for b in range(rows.shape[0]):
+                to_cross[a, b] = u * rows[b, j] + v * rows[b, full + j]
+            for b in range(2):
+                to_own[a, b] = root[j] * (
+                    u * by_point[b * ROW + j] + v * by_point[b * ROW + BLOCK + j]
+                )
+
+
+@njit(cache=True, error_model="numpy")
+def _misses(uv, chosen, count, full, work, residual, off):  # type: ignore[no-untyped-def]
+    """Observed less predicted, into the frame's residuals and into a row."""
+    for j in range(count):
+        at = chosen[j]
+        off[j] = residual[at, 0] = uv[at, 0] - work[U + j]
+        off[BLOCK + j] = residual[at, 1] = uv[at, 1] - work[V + j]
+    for j in range(count, full):
+        off[j] = off[BLOCK + j] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _choose(weight, chosen):  # type: ignore[no-untyped-def]
+    """The corners that count, into `chosen`; how many they are."""
+    seen = 0
+    for j in range(weight.shape[0]):
+        if weight[j] != 0.0:
+            chosen[seen] = j
+            seen += 1
+    return seen
+
+
+@njit(cache=True, error_model="numpy")
+def _mirror(gram):  # type: ignore[no-untyped-def]
+    for a in range(gram.shape[0]):
+        for b in range(a):
+            gram[a, b] = gram[b, a]
+
+
+# This is where all the time goes.
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_corner(w, jx, rows, at, cross, own):  # type: ignore[no-untyped-def]
-    """Products of one corner's own in-plane shift; `rows` carry the root of its weight."""
-    root = math.sqrt(w)
-    for a in range(2):
-        for b in range(rows.shape[0]):
-            cross[a, b] = root * (jx[0, a] * rows[b, at] + jx[1, a] * rows[b, at + 1])
-        for b in range(2):
-            own[a, b] = w * (jx[0, a] * jx[0, b] + jx[1, a] * jx[1, b])
-
-
-# One flat loop: this is where all the time goes, and numba inlines nothing across arrays.
-@njit(cache=True, nogil=True, error_model="numpy")
-def _accumulate(optics, poses, points, uv, weight, active, basis, gram, residual, cross, own):  # type: ignore[no-untyped-def]  # noqa: C901
-    shift = np.zeros(5)
-    tilt = np.zeros(4)
-    jt = np.zeros(4)
-    jp = np.zeros((2, 6))
-    jo = np.zeros((2, K))
-    jx = np.zeros((2, 3))
-    seen = np.zeros(2)
-    ka = active.shape[0]
-    nb = basis.shape[0]
+def _accumulate(optics, poses, points, uv, weight, active, basis, gram, residual, cross, own):  # type: ignore[no-untyped-def]
+    work, jac, off, by_point = np.zeros(WORK), np.zeros(JAC), np.zeros(ROW), np.zeros(3 * ROW)
+    ka, nb = active.shape[0], basis.shape[0]
     q = ka + 6 + nb + 1
-    rows = np.zeros((q, 2 * BLOCK))
+    rows, root = np.zeros((q, ROW)), np.zeros(BLOCK)
+    chosen = np.empty(points.shape[0], np.int64)
     corners = own.shape[0] > 0
-    rare = False
-    for k in range(ka):
-        rare = rare or FIRST_RARE <= active[k] <= LAST_RARE
+    rare = np.any((active >= FIRST_RARE) & (active <= LAST_RARE))
     for i in range(poses.shape[0]):
-        o = optics[i]
-        pose = poses[i]
-        _tilt_of(o, tilt)
-        derive = EVERYTHING if rare or _has_rare(o) else BROWN
-        sweeps = _has_sweep(o)
-        filled = 0
-        for j in range(points.shape[0]):
-            w = weight[i, j]
-            if w == 0.0:
-                continue
-            p = points[j]
-            _corner(o, tilt, pose, p[0], p[1], p[2], seen, jp, jo, shift, jt, derive)
-            if sweeps:
-                _swept(o, tilt, pose, p[0], p[1], p[2], seen, jp, jo, shift, jt, derive)
-            root = math.sqrt(w)
-            for c in range(2):
-                at = filled + c
-                for k in range(ka):
-                    rows[k, at] = root * jo[c, active[k]]
-                for k in range(6):
-                    rows[ka + k, at] = root * jp[c, k]
-                if nb > 0 or corners:
-                    for k in range(3):
-                        jx[c, k] = (
-                            jp[c, 0] * pose[0, k] + jp[c, 1] * pose[1, k] + jp[c, 2] * pose[2, k]
-                        )
-                for k in range(nb):
-                    rows[ka + 6 + k, at] = root * (
-                        jx[c, 0] * basis[k, j, 0]
-                        + jx[c, 1] * basis[k, j, 1]
-                        + jx[c, 2] * basis[k, j, 2]
-                    )
-                residual[i, j, c] = uv[i, j, c] - seen[c]
-                rows[q - 1, at] = root * residual[i, j, c]
+        seen = _choose(weight[i], chosen)
+        derive = EVERYTHING if rare or _has_rare(optics[i]) else BROWN
+        # blocks of one length: a short one at the end would be filled up in vain
+        parts = (seen + BLOCK - 1) // BLOCK
+        length = (seen + parts - 1) // max(parts, 1)
+        for first in range(0, seen, max(length, 1)):
+            count = min(length, seen - first)
+            these = chosen[first : first + count]
+            full = _take(points, these, count, work)
+            _corners(optics[i], poses[i], full, work, jac, derive)
+            _misses(uv[i], these, count, full, work, residual[i], off)
+            for j in range(count):
+                root[j] = math.sqrt(weight[i, these[j]])
+            root[count:full] = 0.0
+            for k in range(ka):
+                at = OPTIC + active[k] * ROW
+                _weigh(jac[at : at + ROW], root, full, rows[k])
+            for k in range(6):
+                _weigh(jac[k * ROW : (k + 1) * ROW], root, full, rows[ka + k])
+            if nb > 0 or corners:
+                _by_point(jac, poses[i], count, by_point)
+                _weigh_modes(by_point, basis, these, root, count, full, rows, ka + 6)
+            _weigh(off, root, full, rows[q - 1])
             if corners:
-                _add_corner(w, jx, rows, filled, cross[i, j], own[i, j])
-            filled += 2
-            if filled == 2 * BLOCK:
-                _add_products(rows, filled, gram[i])
-                filled = 0
-        _add_products(rows, filled, gram[i])
-        for a in range(q):
-            for b in range(a):
-                gram[i, a, b] = gram[i, b, a]
+                _add_corners(by_point, rows, these, root, count, full, cross[i], own[i])
+            _add_products(rows, 2 * full, gram[i])
+        _mirror(gram[i])
 
 
 @dataclass(frozen=True)
