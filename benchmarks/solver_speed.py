@@ -30,7 +30,7 @@ from scipy.spatial.transform import Rotation
 
 from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
-from calib.paper.homography import robust_homography
+from calib.paper.homography import robust_homographies
 from calib.paper.zhang import zhang_pinhole
 from calib.solver.free_poses import fit_free_poses
 from calib.views import Board, FloatArray
@@ -74,8 +74,7 @@ def observed(frames: int) -> tuple[FloatArray, FloatArray]:
 def start(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Zhang's closed form: (K,) optics and (N, 4, 4) poses."""
     flat = BOARD.corners_m[:, :2]
-    homographies = np.array([robust_homography(flat, c)[0] for c in corners])
-    row, poses = zhang_pinhole(homographies, WIDTH, HEIGHT)
+    row, poses = zhang_pinhole(robust_homographies(flat, corners)[0], WIDTH, HEIGHT)
     row[COLUMN["skew_px"]] = 0.0
     return row, poses
 

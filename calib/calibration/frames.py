@@ -8,7 +8,7 @@ import numpy as np
 
 from calib.calibration.result import Rejection
 from calib.errors import CalibrationError
-from calib.paper.homography import robust_homography
+from calib.paper.homography import robust_homographies
 from calib.views import BoolArray, FloatArray, Views
 
 CORNERS_NEEDED = 8
@@ -33,20 +33,15 @@ def usable_frames(views: Views) -> Usable:
     CalibrationError
         Fewer than three frames are left.
     """
-    homographies = np.full((len(views), 3, 3), np.nan)
-    good = np.zeros(views.seen.shape, dtype=bool)
-    flat = views.board.corners_m[:, :2]
-    rejected = []
-    for i, frame in enumerate(views.frame):
-        seen = int(views.seen[i].sum())
-        if seen < CORNERS_NEEDED:
-            reason = "no corners" if seen == 0 else f"only {seen} corners seen"
-            rejected.append(Rejection(int(frame), reason))
-            continue
-        try:
-            homographies[i], good[i] = robust_homography(flat, views.corners_px[i])
-        except CalibrationError as error:
-            rejected.append(Rejection(int(frame), str(error)))
+    seen = views.seen.sum(axis=1)
+    few = seen < CORNERS_NEEDED
+    corners_px = np.where(few[:, None, None], np.nan, views.corners_px)
+    homographies, good, failed = robust_homographies(views.board.corners_m[:, :2], corners_px)
+    failed |= {
+        int(i): "no corners" if seen[i] == 0 else f"only {seen[i]} corners seen"
+        for i in np.flatnonzero(few)
+    }
+    rejected = [Rejection(int(views.frame[i]), failed[i]) for i in sorted(failed)]
     used: BoolArray = np.asarray(np.isfinite(homographies).all(axis=(1, 2)))
     require_frames(int(used.sum()), len(views))
     return Usable(homographies, used, good, tuple(rejected))

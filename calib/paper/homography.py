@@ -17,6 +17,8 @@ from calib.views import BoolArray, FloatArray
 
 # Beyond this many sigma a corner is a wrong detection; at 5 a good one is lost once in 270 000.
 OUTLIER_SIGMA = 5.0
+FEWEST = 5
+"""Corners with which a homography has an error."""
 _RAYLEIGH_MEDIAN = 1.17741
 
 _NEAR_ENOUGH = 1e-8
@@ -126,20 +128,45 @@ def fit_homography(
     return _with_errors(matrix, plane_m, image_px, weight, seen, good)
 
 
-def robust_homography(plane_m: FloatArray, image_px: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Matrix and inliers of `fit_homography` alone, in a third of its time; raises as that does."""
-    seen = _enough(image_px)
-    p = plane_m[seen]
-    H, good = _robust(p, image_px[seen], np.ones(len(p)))
-    seen[seen] = good
-    return H, seen
+def robust_homographies(
+    plane_m: FloatArray, images_px: FloatArray
+) -> tuple[FloatArray, BoolArray, dict[int, str]]:
+    """Matrices and inliers of `fit_homography` alone, for many pictures of one plane.
+
+    Parameters
+    ----------
+    plane_m:
+        (M, 2) points on the plane, metres.
+    images_px:
+        (N, M, 2) their images; NaN where one was not seen.
+
+    Returns
+    -------
+    (N, 3, 3) image_from_plane, NaN where a picture fixes none; (N, M) the corners used; and why
+    a picture fixes none, by its place.
+    """
+    matrices = np.full((len(images_px), 3, 3), np.nan)
+    good: BoolArray = np.asarray(np.isfinite(images_px).all(axis=2))
+    hard = np.zeros(len(images_px), dtype=np.bool_)
+    _fit_all(np.ascontiguousarray(plane_m), np.ascontiguousarray(images_px), matrices, good, hard)
+    failed = {}
+    for i in np.flatnonzero(hard):
+        seen = good[i].copy()
+        try:
+            _enough(images_px[i])
+            matrices[i], good[i, seen] = _robust(
+                plane_m[seen], images_px[i, seen], np.ones(np.count_nonzero(seen))
+            )
+        except CalibrationError as error:
+            good[i], failed[int(i)] = False, str(error)
+    return matrices, good, failed
 
 
 def _enough(image_px: FloatArray) -> BoolArray:
     seen: BoolArray = np.asarray(np.isfinite(image_px).all(axis=1))
     count = np.count_nonzero(seen)
-    if count < 5:
-        raise CalibrationError(f"a homography with an error needs 5 corners, {count} seen")
+    if count < FEWEST:
+        raise CalibrationError(f"a homography with an error needs {FEWEST} corners, {count} seen")
     return seen
 
 
@@ -167,7 +194,8 @@ def _with_errors(
     freedom = max(used.size - 8, 1)
     variance = float(counted @ (used**2).sum(axis=1) / freedom)
     N, unused = np.zeros((8, 8)), np.zeros(8)
-    _normal_equations(matrix, plane_m[inlier], image_px[inlier], counted, N, unused)
+    p, q = np.ascontiguousarray(plane_m[inlier].T), np.ascontiguousarray(image_px[inlier].T)
+    _normal_equations(matrix, p, q, counted, N, unused, np.empty((5, len(counted))))
     scale = np.sqrt(np.diag(N))
     covariance = variance * np.linalg.inv(N / np.outer(scale, scale)) / np.outer(scale, scale)
     return Homography(matrix, covariance, inlier, residual, float(np.sqrt(variance)))
@@ -190,25 +218,8 @@ def _normaliser(points: FloatArray) -> FloatArray:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _add_row_products(x, y, depth, u, v, ru, rv, w, N, right):  # type: ignore[no-untyped-def]
-    """Add one corner's part: rows (a, 0, -u p) and (0, a, -v p) over the depth.
-
-    a = (x, y, 1), p = (x, y): the derivative of its image by the first eight elements.
-    """
-    a = (x / depth, y / depth, 1.0 / depth)
-    for i in range(3):
-        for j in range(i, 3):
-            N[i, j] += w * a[i] * a[j]
-        for j in range(2):
-            N[i, 6 + j] -= w * u * a[i] * a[j]
-            N[3 + i, 6 + j] -= w * v * a[i] * a[j]
-        right[i] += w * ru * a[i]
-        right[3 + i] += w * rv * a[i]
-    for i in range(2):
-        for j in range(i, 2):
-            N[6 + i, 6 + j] += w * (u * u + v * v) * a[i] * a[j]
-        right[6 + i] -= w * (u * ru + v * rv) * a[i]
+_SUMS = {"reassoc", "contract", "nsz"}
+"""Sums may be taken in another order, so that they go several corners at a time."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -222,18 +233,93 @@ def _mirror(N):  # type: ignore[no-untyped-def]
             N[i, j] = N[j, i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _normal_equations(H, p, q, w, N, right):  # type: ignore[no-untyped-def]
-    """Gauss-Newton equations of (M, 2) points at H, into (8, 8) and (8,)."""
-    N[:, :] = 0.0
-    right[:] = 0.0
-    for i in range(len(p)):
-        x, y = p[i, 0], p[i, 1]
-        depth = H[2, 0] * x + H[2, 1] * y + H[2, 2]
-        u = (H[0, 0] * x + H[0, 1] * y + H[0, 2]) / depth
-        v = (H[1, 0] * x + H[1, 1] * y + H[1, 2]) / depth
-        _add_row_products(x, y, depth, u, v, q[i, 0] - u, q[i, 1] - v, w[i], N, right)
+# Each loop is one run of sums, few enough to stay in the processor's registers.
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)
+def _add_products(x, y, depth, u, v, w, N):  # type: ignore[no-untyped-def]
+    """Products of the rows (a, 0, -u p) and (0, a, -v p) over the depth.
+
+    a = (x, y, 1), p = (x, y): the derivative of a corner's image by the first eight elements.
+    """
+    xx = xy = yy = x1 = y1 = one = 0.0
+    uxx = uxy = uyy = ux = uy = 0.0
+    for i in range(len(x)):
+        c = w[i] / (depth[i] * depth[i])
+        cx, cy, cu = c * x[i], c * y[i], c * u[i]
+        cux, cuy = cu * x[i], cu * y[i]
+        xx += cx * x[i]
+        xy += cx * y[i]
+        yy += cy * y[i]
+        x1 += cx
+        y1 += cy
+        one += c
+        uxx += cux * x[i]
+        uxy += cux * y[i]
+        uyy += cuy * y[i]
+        ux += cux
+        uy += cuy
+    vxx = vxy = vyy = vx = vy = sxx = sxy = syy = 0.0
+    for i in range(len(x)):
+        c = w[i] / (depth[i] * depth[i])
+        cv, cs = c * v[i], c * (u[i] * u[i] + v[i] * v[i])
+        cvx, cvy, csx = cv * x[i], cv * y[i], cs * x[i]
+        vxx += cvx * x[i]
+        vxy += cvx * y[i]
+        vyy += cvy * y[i]
+        vx += cvx
+        vy += cvy
+        sxx += csx * x[i]
+        sxy += csx * y[i]
+        syy += cs * y[i] * y[i]
+    N[0, 0], N[0, 1], N[0, 2], N[1, 1], N[1, 2], N[2, 2] = xx, xy, x1, yy, y1, one
+    N[0, 6], N[0, 7], N[1, 6], N[1, 7], N[2, 6], N[2, 7] = -uxx, -uxy, -uxy, -uyy, -ux, -uy
+    N[3, 6], N[3, 7], N[4, 6], N[4, 7], N[5, 6], N[5, 7] = -vxx, -vxy, -vxy, -vyy, -vx, -vy
+    N[6, 6], N[6, 7], N[7, 7] = sxx, sxy, syy
+    N[0:3, 3:6] = 0.0
     _mirror(N)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_SUMS)
+def _add_misses(x, y, depth, u, v, ru, rv, w, right):  # type: ignore[no-untyped-def]
+    """Products of the rows with how far the corners are off, (ru, rv)."""
+    r0 = r1 = r2 = r3 = r4 = r5 = r6 = r7 = 0.0
+    for i in range(len(x)):
+        c = w[i] / depth[i]
+        cu, cv = c * ru[i], c * rv[i]
+        both = u[i] * cu + v[i] * cv
+        r0 += cu * x[i]
+        r1 += cu * y[i]
+        r2 += cu
+        r3 += cv * x[i]
+        r4 += cv * y[i]
+        r5 += cv
+        r6 += both * x[i]
+        r7 += both * y[i]
+    right[0], right[1], right[2], right[3], right[4], right[5] = r0, r1, r2, r3, r4, r5
+    right[6], right[7] = -r6, -r7
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _map(H, x, y, qu, qv, rows):  # type: ignore[no-untyped-def]
+    """Depth, image and how far the seen one is off it, into the five rows."""
+    h00, h01, h02, h10, h11, h12 = H[0, 0], H[0, 1], H[0, 2], H[1, 0], H[1, 1], H[1, 2]
+    h20, h21, h22 = H[2, 0], H[2, 1], H[2, 2]
+    depth, u, v, ru, rv = rows[0], rows[1], rows[2], rows[3], rows[4]
+    for i in range(len(x)):
+        depth[i] = h20 * x[i] + h21 * y[i] + h22
+    for i in range(len(x)):
+        u[i] = (h00 * x[i] + h01 * y[i] + h02) / depth[i]
+        ru[i] = qu[i] - u[i]
+    for i in range(len(x)):
+        v[i] = (h10 * x[i] + h11 * y[i] + h12) / depth[i]
+        rv[i] = qv[i] - v[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _normal_equations(H, p, q, w, N, right, rows):  # type: ignore[no-untyped-def]
+    """Gauss-Newton equations of (2, M) points at H, into (8, 8) and (8,); `rows` is (5, M)."""
+    _map(H, p[0], p[1], q[0], q[1], rows)
+    _add_products(p[0], p[1], rows[0], rows[1], rows[2], w, N)
+    _add_misses(p[0], p[1], rows[0], rows[1], rows[2], rows[3], rows[4], w, right)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -267,7 +353,7 @@ def _solve(N, right):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _centred(points, out):  # type: ignore[no-untyped-def]
-    """Points about their centre, of unit spread, into `out`; centre and spread."""
+    """(M, 2) points about their centre, of unit spread, into (2, M); centre and spread."""
     m = len(points)
     cx = 0.0
     cy = 0.0
@@ -279,27 +365,24 @@ def _centred(points, out):  # type: ignore[no-untyped-def]
         square += (points[i, 0] - cx) ** 2 + (points[i, 1] - cy) ** 2
     spread = math.sqrt(square / m / 2.0)
     for i in range(m):
-        out[i, 0] = (points[i, 0] - cx) / spread
-        out[i, 1] = (points[i, 1] - cy) / spread
+        out[0, i] = (points[i, 0] - cx) / spread
+        out[1, i] = (points[i, 1] - cy) / spread
     return cx, cy, spread
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _squares(H, p, q, w, out):  # type: ignore[no-untyped-def]
+def _squares(H, p, q, w, out, rows):  # type: ignore[no-untyped-def]
     """(M,) weighted squared distances into `out`; their robust one-sigma per axis."""
-    for i in range(len(p)):
-        x, y = p[i, 0], p[i, 1]
-        depth = H[2, 0] * x + H[2, 1] * y + H[2, 2]
-        ru = q[i, 0] - (H[0, 0] * x + H[0, 1] * y + H[0, 2]) / depth
-        rv = q[i, 1] - (H[1, 0] * x + H[1, 1] * y + H[1, 2]) / depth
-        out[i] = w[i] * (ru * ru + rv * rv)
+    _map(H, p[0], p[1], q[0], q[1], rows)
+    ru, rv = rows[3], rows[4]
+    for i in range(len(out)):
+        out[i] = w[i] * (ru[i] * ru[i] + rv[i] * rv[i])
     return math.sqrt(np.median(out)) / _RAYLEIGH_MEDIAN
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _step(H, p, q, w, N, right):  # type: ignore[no-untyped-def]
-    """One Gauss-Newton step; its largest element."""
-    _normal_equations(H, p, q, w, N, right)
+def _take_step(H, N, right):  # type: ignore[no-untyped-def]
+    """Solve, and put the step on H; its largest element."""
     _solve(N, right)
     largest = 0.0
     for k in range(8):
@@ -309,14 +392,18 @@ def _step(H, p, q, w, N, right):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _step(H, p, q, w, N, right, rows):  # type: ignore[no-untyped-def]
+    """One Gauss-Newton step; its largest element."""
+    _normal_equations(H, p, q, w, N, right, rows)
+    return _take_step(H, N, right)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _linear(p, q, H, N, right):  # type: ignore[no-untyped-def]
     """Direct linear transform by normal equations; the least pivot, as `_solve`."""
-    N[:, :] = 0.0
-    right[:] = 0.0
-    for i in range(len(p)):
-        u, v = q[i, 0], q[i, 1]
-        _add_row_products(p[i, 0], p[i, 1], 1.0, u, v, u, v, 1.0, N, right)
-    _mirror(N)
+    one = np.ones(p.shape[1])
+    _add_products(p[0], p[1], one, q[0], q[1], one, N)
+    _add_misses(p[0], p[1], one, q[0], q[1], q[0], q[1], one, right)
     least = _solve(N, right)
     for k in range(8):
         H[k // 3, k % 3] = right[k]
@@ -339,17 +426,21 @@ def _normalise(matrix, px, py, ps, qx, qy, qs, H):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _robust_weights(H, p, q, w, good, least, N, right):  # type: ignore[no-untyped-def]
+def _robust_weights(H, p, q, w, good, least, N, right, rows):  # type: ignore[no-untyped-def]
     """Cauchy's fit from `H` on; which corners are good, and (M,) weights of those alone."""
-    m = len(p)
+    m = len(w)
     square, counted = np.empty(m), np.empty(m)
     for _ in range(20):
-        spread = 2.385 * max(_squares(H, p, q, w, square), 1e-12)
+        # the squares leave in `rows` what the equations at the same place need
+        spread = 2.385 * max(_squares(H, p, q, w, square, rows), 1e-12)
+        per = 1.0 / (spread * spread)
         for i in range(m):
-            counted[i] = w[i] / (1.0 + square[i] / (spread * spread))
-        if _step(H, p, q, counted, N, right) < _NEAR_ENOUGH:
+            counted[i] = w[i] / (1.0 + square[i] * per)
+        _add_products(p[0], p[1], rows[0], rows[1], rows[2], counted, N)
+        _add_misses(p[0], p[1], rows[0], rows[1], rows[2], rows[3], rows[4], counted, right)
+        if _take_step(H, N, right) < _NEAR_ENOUGH:
             break
-    sigma = max(_squares(H, p, q, w, square), least)
+    sigma = max(_squares(H, p, q, w, square, rows), least)
     for i in range(m):
         good[i] = square[i] <= (OUTLIER_SIGMA * sigma) ** 2
         counted[i] = w[i] if good[i] else 0.0
@@ -364,7 +455,7 @@ def _fit(plane, image, w, matrix, good, given):  # type: ignore[no-untyped-def]
     A robust fit only tells the wrong corners, so it need not be at its very end.
     """
     m = len(plane)
-    p, q = np.empty((m, 2)), np.empty((m, 2))
+    p, q, rows = np.empty((2, m)), np.empty((2, m)), np.empty((5, m))
     px, py, ps = _centred(plane, p)
     qx, qy, qs = _centred(image, q)
     H, N, right = np.empty((3, 3)), np.empty((8, 8)), np.empty(8)
@@ -372,9 +463,9 @@ def _fit(plane, image, w, matrix, good, given):  # type: ignore[no-untyped-def]
         _normalise(matrix, px, py, ps, qx, qy, qs, H)
     elif not _linear(p, q, H, N, right) > _WELL_POSED:
         return False
-    counted = _robust_weights(H, p, q, w, good, 1e-9 / qs, N, right)
+    counted = _robust_weights(H, p, q, w, good, 1e-9 / qs, N, right, rows)
     for _ in range(6):
-        if _step(H, p, q, counted, N, right) < 1e-12:
+        if _step(H, p, q, counted, N, right, rows) < 1e-12:
             break
     for i in range(3):
         H[i, 0] /= ps
@@ -386,3 +477,31 @@ def _fit(plane, image, w, matrix, good, given):  # type: ignore[no-untyped-def]
         matrix[2, j] = H[2, j]
     matrix /= matrix[2, 2]
     return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fit_all(plane, images, matrices, good, hard):  # type: ignore[no-untyped-def]
+    """`_fit` of each picture's seen corners; `hard` where it needs a better start.
+
+    `good` holds the corners seen, and of a picture that was fitted those that count.
+    """
+    m = len(plane)
+    p, q, w, kept = np.empty((m, 2)), np.empty((m, 2)), np.ones(m), np.ones(m, np.bool_)
+    for i in range(len(images)):
+        count = 0
+        for j in range(m):
+            if good[i, j]:
+                p[count], q[count] = plane[j], images[i, j]
+                count += 1
+        fits = count >= FEWEST and _fit(
+            p[:count], q[:count], w[:count], matrices[i], kept[:count], False
+        )
+        if not fits:
+            hard[i] = True
+            matrices[i] = np.nan
+            continue
+        count = 0
+        for j in range(m):
+            if good[i, j]:
+                good[i, j] = kept[count]
+                count += 1

@@ -109,7 +109,7 @@ def fit_free_poses(
         own = reduced.at_zero - reduced.back @ step
         trial_optics = optics.copy()
         trial_optics[:, active] += step
-        trial_poses = rigid.from_vector(own) @ poses
+        trial_poses = rigid.product(rigid.from_vector(own), poses)
         trial, trial_residual = _equations(
             trial_optics, trial_poses, points_m, corners_px, counted, active
         )

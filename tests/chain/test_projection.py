@@ -88,7 +88,8 @@ def test_every_derivative_is_that_of_automatic_differentiation(lens: str) -> Non
     values = np.array([row[COLUMN[name]] for name in DIFFERENTIABLE])
     columns = [COLUMN[name] for name in DIFFERENTIABLE]
     uv, j_pose, j_optics = project_with_jacobians(_repeated(row), POSES, POINTS)
-    assert np.array_equal(uv, project(_repeated(row), POSES, POINTS))
+    # the same to rounding: products are fused with sums differently where nothing is differentiated
+    assert np.abs(uv - project(_repeated(row), POSES, POINTS)).max() < 1e-9
     for i, pose in enumerate(POSES):
         for j, point in enumerate(POINTS):
             function = _independent(row, pose, point)
