@@ -24,7 +24,7 @@ _LEFT_OUT_SHARE = 0.1
 _BETTER = 0.15
 """Two cameras must bring the mean square down to this share."""
 
-_FEWEST = 6
+_FEWEST = 4
 _COARSE = 12
 _CAP = 36.0
 """A frame counts for so many times the homographies' mean square at most."""
