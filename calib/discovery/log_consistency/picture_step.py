@@ -22,7 +22,7 @@ _SUSPECT = 2.0
 
 _LEFT_OUT_SHARE = 0.1
 _BETTER = 0.15
-"""Two cameras must bring the mean square down to this share."""
+"""Two cameras must bring what the mean square has above the homographies' down to this share."""
 
 _FEWEST = 4
 _COARSE = 12
@@ -63,7 +63,7 @@ def find_picture_step(views: Views, baseline: Baseline) -> PictureStep | None:
     for at in range(max(near - stride, _FEWEST), min(near + stride, len(views) - _FEWEST) + 1):
         costs.setdefault(at, _split_cost(views, at, floor))
     best = min(costs, key=lambda at: costs[at])
-    if costs[best] > _BETTER * single.mean():
+    if costs[best] - floor > _BETTER * (single.mean() - floor):
         return None
     return _step(views, best)
 
