@@ -6,11 +6,10 @@
 
 from __future__ import annotations
 
-import http.client
 import json
-import time
 from typing import Any
 
+from drivers.bounded_http import BoundedHttp, NoAnswer
 from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameLost
 from drivers.jpeg import jpeg_size
 
@@ -18,7 +17,7 @@ PORT = 4242
 MOST_PIXELS = 1 << 24
 """The sensor has 5 million."""
 _LARGEST_ANSWER_BYTES = 1 << 25
-_CHUNK_BYTES = 1 << 16
+_OK = 200
 
 
 class RobotiqHttp:
@@ -26,7 +25,7 @@ class RobotiqHttp:
 
     def __init__(self, host: str, port: int) -> None:
         self.name = f"Robotiq camera {host}:{port}"
-        self._connection = http.client.HTTPConnection(host, port)
+        self._http = BoundedHttp(host, port, _LARGEST_ANSWER_BYTES)
 
     def picture(self, deadline_s: float) -> bytes:
         """The newest picture, a JPEG file.
@@ -73,61 +72,18 @@ class RobotiqHttp:
 
     def close(self) -> None:
         """Close the connection. Idempotent."""
-        self._connection.close()
+        self._http.close()
 
     def _request(self, verb: str, path: str, body: str | None, deadline_s: float) -> bytes:
-        reused = self._connection.sock is not None
         try:
-            try:
-                return self._once(verb, path, body, deadline_s)
-            except (http.client.RemoteDisconnected, BrokenPipeError, ConnectionResetError):
-                # a server may close an idle connection at any time: that is no fault yet
-                if not reused:
-                    raise
-                self._connection.close()
-                return self._once(verb, path, body, deadline_s)
-        except (OSError, http.client.HTTPException) as error:
-            self._connection.close()
-            if isinstance(error, http.client.IncompleteRead):
+            status, answer = self._http.ask(verb, path, deadline_s, body, "text/plain")
+        except NoAnswer as error:
+            if error.cut_short:
                 raise FrameLost(f"{self.name}: the answer was cut short") from None
             raise DeviceUnreachable(
-                f"{self.name}: {_reason(error)}; check the robot's address and that the Robotiq "
+                f"{self.name}: {error}; check the robot's address and that the Robotiq "
                 "camera's URCap runs"
             ) from None
-
-    def _once(self, verb: str, path: str, body: str | None, deadline_s: float) -> bytes:
-        self._limit(deadline_s)
-        headers = {"Content-Type": "text/plain"} if body else {}
-        self._connection.request(verb, path, body, headers)
-        self._limit(deadline_s)
-        answer = self._connection.getresponse()
-        parts, size_bytes = [], 0
-        while chunk := answer.read1(_CHUNK_BYTES):
-            parts.append(chunk)
-            size_bytes += len(chunk)
-            if size_bytes > _LARGEST_ANSWER_BYTES:
-                raise http.client.HTTPException
-            self._limit(deadline_s)
-        missing_bytes = answer.length
-        answer.close()
-        whole = b"".join(parts)
-        if missing_bytes:
-            raise http.client.IncompleteRead(whole, missing_bytes)
-        if answer.status != http.client.OK:
-            raise DeviceError(f"{self.name}: {path} answers HTTP status {answer.status}")
-        return whole
-
-    def _limit(self, deadline_s: float) -> None:
-        left_s = deadline_s - time.monotonic()
-        if left_s <= 0:
-            raise TimeoutError("no answer in time")
-        self._connection.timeout = left_s
-        if self._connection.sock is not None:
-            self._connection.sock.settimeout(left_s)
-
-
-def _reason(error: Exception) -> str:
-    """Why nothing came, in words of ours: what the other side sent is for no message."""
-    if isinstance(error, http.client.HTTPException):
-        return f"what answers does not speak HTTP as it should ({type(error).__name__})"
-    return str(error) or type(error).__name__
+        if status != _OK:
+            raise DeviceError(f"{self.name}: {path} answers HTTP status {status}")
+        return answer

@@ -146,7 +146,10 @@ def arm_of(cell: CellFile) -> Arm:
     if isinstance(robot, UniversalRobot):
         from drivers.ur import URArm, URSettings
 
-        return URArm(robot.address, URSettings(upper_registers=robot.upper_registers))
+        settings = URSettings(
+            upper_registers=robot.upper_registers, robot_api_port=robot.robot_api_port
+        )
+        return URArm(robot.address, settings)
     if isinstance(robot, AbbRobot):
         from cell.devices.abb_settings import abb_settings
         from drivers.abb import ABBArm

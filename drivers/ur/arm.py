@@ -1,4 +1,4 @@
-"""A Universal Robots arm (CB3 from 3.12, e-Series from 5.5.1; PolyScope 3 and 5)."""
+"""A Universal Robots arm: CB3 from 3.12, e-Series from 5.5.1, PolyScope X from 10.11."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from drivers.errors import (
 )
 from drivers.targets import check_target
 from drivers.untried import warn_untried
-from drivers.ur.dashboard import Dashboard
 from drivers.ur.kinematics_info import KinematicsInfo, read_kinematics
 from drivers.ur.motion import MoveOrder
+from drivers.ur.panel import Panel
 from drivers.ur.pose import base_from_flange, base_from_tcp, pose_of
 from drivers.ur.reader import Packet, RtdeReader
 from drivers.ur.runtime import Runtime
@@ -28,6 +28,7 @@ from drivers.ur.speed import leading_joint_speed_rad_s, tcp_speed_m_s
 from drivers.ur.status import fault_in
 from drivers.ur.supervisor import Supervisor
 from drivers.ur.verdicts import at_rest
+from drivers.ur.which_panel import panel_of
 
 _log = logging.getLogger("cell.drivers")
 _JOINT_LIMIT_RAD = 6.3
@@ -55,6 +56,7 @@ class URArm:
             host, rate_hz=self._settings.rate_hz, silence_s=self._settings.silence_s
         )
         self._supervisor: Supervisor | None = None
+        self._panel: Panel | None = None
         self.identity: dict[str, str] = {}
         self.kinematics: KinematicsInfo | None = None
 
@@ -128,7 +130,7 @@ class URArm:
         if supervisor is not None and not supervisor.stop():
             raise StopFailed(
                 self._named(
-                    "neither the dashboard nor a script port took the stop. The controller's "
+                    "no way to stop it took the order. The controller's "
                     "watchdog should have stopped the arm; make sure, at the emergency stop"
                 )
             )
@@ -141,15 +143,11 @@ class URArm:
         """
         supervisor = self._connected()
         self.stop()
-        dashboard = Dashboard(self._host)
-        try:
-            dashboard.ask("stop")
-            dashboard.ask("close safety popup")
-            answer = dashboard.ask("unlock protective stop")
-        finally:
-            dashboard.close()
-        if not answer.startswith("Protective stop releasing"):
-            raise DeviceRefused(self._named(answer))
+        assert self._panel is not None
+        self._panel.stop_program()
+        refusal = self._panel.unlock_protective_stop()
+        if refusal is not None:
+            raise DeviceRefused(self._named(refusal))
         self._await_no_fault()
         supervisor.clear()
         supervisor.prepare()
@@ -161,24 +159,21 @@ class URArm:
         if self._supervisor is not None:
             self._supervisor.close()
             self._supervisor = None
+        if self._panel is not None:
+            self._panel.close()
+            self._panel = None
         self._reader.close()
 
     def _identify(self) -> None:
-        dashboard = Dashboard(self._host)
-        try:
-            questions = {"polyscope": "PolyscopeVersion", "model": "get robot model"}
-            self.identity = {key: dashboard.ask(line) for key, line in questions.items()}
-            self.identity["serial"] = dashboard.ask("get serial number")
-            # CB3 and the simulator before 5.6 do not know the question
-            if dashboard.ask("is in remote control") == "false":
-                raise DeviceRefused(
-                    self._named(
-                        "is in local mode, where it ignores programs from outside: switch to "
-                        "Remote Control at the top right of the teach pendant"
-                    )
+        self._panel = panel_of(self._host, self._settings.robot_api_port)
+        self.identity = self._panel.identity()
+        if self._panel.in_local_mode():
+            raise DeviceRefused(
+                self._named(
+                    "is in local mode, where it ignores programs from outside: switch to "
+                    "Remote Control at the top right of the teach pendant"
                 )
-        finally:
-            dashboard.close()
+            )
 
     def _start(self) -> None:
         fault = fault_in(self._reader.newest())
@@ -193,7 +188,8 @@ class URArm:
                     "arm were stretched out"
                 )
             )
-        self._supervisor = Supervisor(self._host, self._settings, self._reader)
+        assert self._panel is not None
+        self._supervisor = Supervisor(self._host, self._settings, self._reader, self._panel)
         self._supervisor.prepare()
         self._wait_ready(self._supervisor)
 

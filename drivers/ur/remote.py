@@ -5,14 +5,14 @@ from __future__ import annotations
 import threading
 
 from drivers.errors import DeviceUnreachable
-from drivers.ur.dashboard import Dashboard
+from drivers.ur.panel import Panel
 
 _PERIOD_S = 0.5
 _FAILURES_ALLOWED = 1
 
 
 class RemoteWatch:
-    """Asks the dashboard server twice a second.
+    """Asks the controller's panel twice a second.
 
     Attributes
     ----------
@@ -20,8 +20,8 @@ class RemoteWatch:
         None, or why the arm must not be driven from here.
     """
 
-    def __init__(self, host: str) -> None:
-        self._dashboard = Dashboard(host)
+    def __init__(self, panel: Panel) -> None:
+        self._panel = panel
         self._closing = threading.Event()
         self.fault: str | None = None
         self._thread = threading.Thread(target=self._watch, name="ur-remote-watch", daemon=True)
@@ -30,13 +30,12 @@ class RemoteWatch:
     def close(self) -> None:
         """End the watch."""
         self._closing.set()
-        self._dashboard.close()
 
     def _watch(self) -> None:
         failures = 0
         while not self._closing.wait(_PERIOD_S):
             try:
-                local = self._dashboard.ask("is in remote control", 1.0) == "false"
+                local = self._panel.in_local_mode()
                 failures = 0
             except DeviceUnreachable as error:
                 local, failures = False, failures + 1

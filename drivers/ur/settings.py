@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from drivers.ur.robot_api import ROBOT_API_PORT
+
 
 @dataclass(frozen=True)
 class URSettings:
@@ -29,6 +31,8 @@ class URSettings:
         A target that asks for more is refused.
     start_timeout_s:
         For the control script to start.
+    robot_api_port:
+        Where PolyScope X serves its robot API.
     """
 
     rate_hz: float = 125.0
@@ -42,3 +46,4 @@ class URSettings:
     max_joint_speed_rad_s: float = 3.14
     max_tcp_speed_m_s: float = 1.0
     start_timeout_s: float = 10.0
+    robot_api_port: int = ROBOT_API_PORT

@@ -19,6 +19,7 @@ import time
 
 from drivers.errors import DeviceError, DeviceUnreachable
 from drivers.ur.motion import ChildOptions, MotionChild, MoveOrder, Phase
+from drivers.ur.panel import Panel
 from drivers.ur.reader import Packet, RtdeReader
 from drivers.ur.remote import RemoteWatch
 from drivers.ur.settings import URSettings
@@ -46,7 +47,7 @@ class Supervisor:
         None, or why it is not known that the arm stopped when it was told to.
     """
 
-    def __init__(self, host: str, settings: URSettings, reader: RtdeReader) -> None:
+    def __init__(self, host: str, settings: URSettings, reader: RtdeReader, panel: Panel) -> None:
         self._reader = reader
         self._settings = settings
         self._options = ChildOptions(
@@ -56,9 +57,9 @@ class Supervisor:
             settings.watchdog_hz,
             settings.heartbeat_s,
         )
-        self._stops = StopPaths(host, settings.stop_deceleration_rad_s2)
+        self._stops = StopPaths(host, settings.stop_deceleration_rad_s2, panel.stop_order)
         self._stops.open()
-        self._remote = RemoteWatch(host)
+        self._remote = RemoteWatch(panel)
         self._lock = threading.RLock()
         self._closing = threading.Event()
         self._child: MotionChild | None = None

@@ -48,7 +48,7 @@ def test_a_silent_robot_is_in_the_way(tmp_path: Path) -> None:
     findings = examine(cell_with(tmp_path, "{driver: ur, model: ur5e, address: 127.0.0.77}"))
     blocking = [finding for finding in findings if finding.blocks]
     assert [finding.name for finding in blocking] == [
-        "UR dashboard 127.0.0.77:29999",
+        "UR controller",
         "UR script 127.0.0.77:30003",
         "UR RTDE 127.0.0.77:30004",
     ]
@@ -74,6 +74,24 @@ def test_a_ready_robot_is_told_as_ready(tmp_path: Path, ur: URController) -> Non
     assert "taken out of every pose" in by_name(findings, "UR tool").found
     assert "s from this computer's" in by_name(findings, "UR clock").found
     assert "weigh camera and bracket" in by_name(findings, "payload").line()
+
+
+def test_polyscope_5_and_polyscope_x_are_told_apart(tmp_path: Path, ur: URController) -> None:
+    assert (
+        "dashboard server: URSoftware 5.12"
+        in by_name(examine(ur_cell(tmp_path, ur)), "UR controller").line()
+    )
+    arm = SimArm(kinematics_of("ur5e"), WallClock(), np.zeros(6))
+    with URController(arm, "127.0.0.79", robot_api_port=8080) as newer:
+        cell = cell_with(
+            tmp_path,
+            f"{{driver: ur, model: ur5e, address: {newer.address}, robot_api_port: 8080}}",
+        )
+        findings = examine(cell)
+        assert not [finding.line() for finding in findings if finding.blocks]
+        assert "PolyScope X, robot API 5.0.107" in by_name(findings, "UR controller").line()
+        newer.remote_control = False
+        assert "safety screen" in by_name(examine(cell), "UR remote control").line()
 
 
 def test_a_robot_in_local_mode_is_named(tmp_path: Path, ur: URController) -> None:

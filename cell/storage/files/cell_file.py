@@ -55,13 +55,15 @@ class SimulatedRobot(Part):
 
 
 class UniversalRobot(SimulatedRobot):
-    """A Universal Robots controller, e-Series or CB3."""
+    """A Universal Robots controller: CB3, e-Series, or one with PolyScope X."""
 
     driver: Literal["ur"]  # type: ignore[assignment]
     address: str
     """Name or IP address of the controller."""
     upper_registers: bool = False
     """Use RTDE registers 24 to 47, where a fieldbus or another client holds the lower ones."""
+    robot_api_port: int = Field(default=80, gt=0, lt=65536)
+    """Where PolyScope X serves its robot API; PolyScope 5 has none."""
 
 
 class AbbRobot(SimulatedRobot):

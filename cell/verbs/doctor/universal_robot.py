@@ -9,11 +9,12 @@ import numpy as np
 from cell.storage.files.cell_file import UniversalRobot
 from cell.verbs.doctor.finding import Finding
 from cell.verbs.doctor.ports import CHECK_LINE, port
-from drivers.errors import DeviceError, DeviceUnreachable
-from drivers.ur.dashboard import Dashboard
+from drivers.errors import DeviceError
+from drivers.ur.panel import Panel
 from drivers.ur.reader import Packet, RtdeReader
+from drivers.ur.which_panel import panel_of
 
-_PORTS = {29999: "dashboard", 30003: "script", 30004: "RTDE"}
+_PORTS = {30003: "script", 30004: "RTDE"}
 _LISTEN_S = 1.0
 _SILENCE_S = 1.0  # nothing moves here, so a busy computer may miss a few packets
 _LONGEST_TOOL_M = 1.0
@@ -21,29 +22,41 @@ _CLOCK_SLIP_S = 0.02
 
 
 def universal_robot(robot: UniversalRobot) -> list[Finding]:
-    """Ports, remote control, safety, power, TCP and clock."""
+    """Which PolyScope it is, ports, remote control, safety, power, TCP and clock."""
     ports = [port(f"UR {name}", robot.address, number) for number, name in _PORTS.items()]
-    dashboard, _, rtde = ports
-    findings = [*ports, *(_state(robot.address) if dashboard.ready else [])]
+    _, rtde = ports
+    findings = [*_panel(robot), *ports]
     return findings + (_packets(robot.address) if rtde.ready else [])
 
 
-def _state(address: str) -> list[Finding]:
-    dashboard = Dashboard(address)
+def _panel(robot: UniversalRobot) -> list[Finding]:
     try:
-        remote = dashboard.ask("is in remote control")
-        safety = dashboard.ask("safetystatus")
-        mode = dashboard.ask("robotmode")
-    except DeviceUnreachable as silent:
-        return [Finding("UR dashboard", False, str(silent), CHECK_LINE)]
+        panel = panel_of(robot.address, robot.robot_api_port)
+    except DeviceError as silent:
+        return [Finding("UR controller", False, str(silent), CHECK_LINE)]
+    try:
+        told = panel.identity()
+        kind = "dashboard server"
+        if "robot_api" in told:
+            kind = f"PolyScope X, robot API {told['robot_api']}"
+        found = ", ".join(told[key] for key in ("polyscope", "model", "serial") if key in told)
+        answers = Finding("UR controller", True, f"{kind}: {found or 'tells no version'}")
+        return [answers, *_state(panel)]
+    except DeviceError as silent:
+        return [Finding("UR controller", False, str(silent), CHECK_LINE)]
     finally:
-        dashboard.close()
+        panel.close()
+
+
+def _state(panel: Panel) -> list[Finding]:
+    local, safety, mode = panel.in_local_mode(), panel.safety(), panel.robot_mode()
     return [
         Finding(
             "UR remote control",
-            "false" not in remote.lower(),
-            remote,
-            "switch the pendant from Local to Remote",
+            not local,
+            "local: programs from outside are ignored" if local else "remote",
+            "switch the pendant from Local to Remote (on PolyScope X in automatic mode, on the"
+            " safety screen)",
         ),
         Finding(
             "UR safety",

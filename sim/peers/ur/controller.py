@@ -1,6 +1,8 @@
-"""A Universal Robots e-Series controller that speaks its own protocols on loopback.
+"""A Universal Robots controller that speaks its own protocols on loopback.
 
-Ports (those of the real controller): 29999 dashboard, 30001 primary, 30003 script, 30004 RTDE.
+Ports (those of the real controller): 30001 primary, 30003 script, 30004 RTDE, and 29999 dashboard
+or, with PolyScope X, the robot API over HTTP (on the real one port 80, which an ordinary user may
+not open).
 Clients of the real robot hard-code them, so every simulated controller gets an address of its own,
 127.0.0.2 and up (127.0.0.1 is left alone: ur-rtde skips its remote-control check there).
 """
@@ -22,12 +24,14 @@ from sim.peers.ur.faults import URFaults
 from sim.peers.ur.modes import Robot, Runtime, Safety
 from sim.peers.ur.primary import PrimaryServer
 from sim.peers.ur.program import ControlProgram
+from sim.peers.ur.robot_api import RobotApiServer
 from sim.peers.ur.rtde import RtdeServer
 from sim.peers.ur.script import ScriptServer
 from sim.peers.ur.variables import motion, status
 
 DASHBOARD_PORT, PRIMARY_PORT, SCRIPT_PORT = 29999, 30001, 30003
 UNLOCK_WAIT_S = 5.0
+_POLYSCOPE_5, _POLYSCOPE_X = (5, 12, 6, 1102099), (10, 14, 0, 104)
 
 
 class URController:
@@ -42,6 +46,10 @@ class URController:
     kinematics:
         Whose Denavit-Hartenberg parameters the primary port reports as the factory calibration;
         None to report none.
+    robot_api_port:
+        Runs PolyScope X and serves its robot API there; None for PolyScope 5 and the dashboard.
+    robot_api_version:
+        Of PolyScope X; see `sim.peers.ur.robot_api`.
     rate_hz:
         Cycle of the control loop and highest RTDE rate.
 
@@ -61,13 +69,16 @@ class URController:
         address: str = "127.0.0.2",
         *,
         kinematics: ArmKinematics | None = None,
+        robot_api_port: int | None = None,
+        robot_api_version: str = "5.0.107",
         rate_hz: float = 125.0,
     ) -> None:
         self.arm = arm
         self.address = address
         self.kinematics = kinematics
         self.rate_hz = rate_hz
-        self.version = (5, 12, 6, 1102099)
+        self.version = _POLYSCOPE_5 if robot_api_port is None else _POLYSCOPE_X
+        self._robot_api = robot_api_port, robot_api_version
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         self.payload_kg = 0.0
         self.payload_cog_m: tuple[float, ...] = (0.0,) * 3
@@ -85,7 +96,7 @@ class URController:
         self._reported = Reported(arm.state, lambda: self.faults)
         self._lock = threading.RLock()
         self._stopping = threading.Event()
-        self._ports: list[Listener] = []
+        self._ports: list[Listener | RobotApiServer] = []
 
     def __enter__(self) -> URController:
         self._stopping.clear()
@@ -94,11 +105,15 @@ class URController:
         self._rtde = RtdeServer(self)
         scripts = ScriptServer(self)
         servers = {
-            DASHBOARD_PORT: DashboardServer(self).serve,
             PRIMARY_PORT: PrimaryServer(self, scripts.serve).serve,
             SCRIPT_PORT: scripts.serve,
             RTDE_PORT: self._rtde.serve,
         }
+        api_port, api_version = self._robot_api
+        if api_port is None:
+            servers[DASHBOARD_PORT] = DashboardServer(self).serve
+        else:
+            self._ports.append(RobotApiServer((self.address, api_port), self, api_version))
         for port, serve in servers.items():
             self._ports.append(Listener((self.address, port), serve))
         self._loop = threading.Thread(target=self._run, name="ur-controller", daemon=True)

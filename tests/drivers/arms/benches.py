@@ -69,9 +69,9 @@ def simulated(model: str, home: tuple[float, ...]) -> SimArm:
 
 
 @contextmanager
-def ur_peer(model: str = "ur5e") -> Iterator[tuple[URController, SimArm]]:
+def ur_peer(model: str = "ur5e", **more: Any) -> Iterator[tuple[URController, SimArm]]:
     sim = simulated(model, UR_HOME)
-    with URController(sim, own_address(), kinematics=kinematics_of(model)) as controller:
+    with URController(sim, own_address(), kinematics=kinematics_of(model), **more) as controller:
         yield controller, sim
 
 
@@ -94,12 +94,16 @@ def sim_bench() -> Iterator[Bench]:
     )
 
 
+ROBOT_API_PORT = 8080
+
+
 @contextmanager
-def ur_bench() -> Iterator[Bench]:
+def ur_bench(robot_api_port: int | None = None) -> Iterator[Bench]:
     with ExitStack() as stack:
-        controller, sim = stack.enter_context(ur_peer())
+        controller, sim = stack.enter_context(ur_peer(robot_api_port=robot_api_port))
         controller.tcp_offset = (0.01, -0.02, 0.15, 0.1, 0.2, 0.3)
-        arm = URArm(controller.address, URSettings(start_timeout_s=5.0))
+        settings = URSettings(start_timeout_s=5.0, robot_api_port=ROBOT_API_PORT)
+        arm = URArm(controller.address, settings)
         stack.callback(arm.close)
         yield Bench(
             arm,
@@ -110,6 +114,12 @@ def ur_bench() -> Iterator[Bench]:
             controller.kill,
             lambda: [event.t_s for event in controller.events if event.what.startswith("halt")],
         )
+
+
+@contextmanager
+def polyscope_x_bench() -> Iterator[Bench]:
+    with ur_bench(ROBOT_API_PORT) as bench:
+        yield bench
 
 
 ABB_HOME = (0.1, 0.2, -0.3, 0.1, 0.6, 0.2)
@@ -204,10 +214,13 @@ def unreachable(arm: Arm) -> bool:
 
 
 @contextmanager
-def ur_moving(**settings: Any) -> Iterator[tuple[URArm, URController, SimArm]]:
+def ur_moving(
+    polyscope_x: bool = False, **settings: Any
+) -> Iterator[tuple[URArm, URController, SimArm]]:
     """A UR arm on its way to `UR_FAR`."""
-    with ur_peer() as (controller, sim):
-        arm = URArm(controller.address, URSettings(**{"start_timeout_s": 3.0, **settings}))
+    api = {"robot_api_port": ROBOT_API_PORT} if polyscope_x else {}
+    with ur_peer(**api) as (controller, sim):
+        arm = URArm(controller.address, URSettings(**{"start_timeout_s": 3.0, **api, **settings}))
         try:
             arm.connect()
             arm.start_move(slowly(UR_FAR))

@@ -8,6 +8,7 @@ import pytest
 from benches import (
     abb_bench,
     abb_egm_bench,
+    polyscope_x_bench,
     quickly,
     sim_bench,
     slowly,
@@ -20,7 +21,13 @@ from scipy.spatial.transform import RigidTransform
 from drivers.arm import Motion, MoveTarget
 from drivers.errors import ArmStopped, DeviceError, DeviceRefused, DeviceUnreachable, SafetyError
 
-BENCHES = {"in process": sim_bench, "ur": ur_bench, "abb": abb_bench, "abb egm": abb_egm_bench}
+BENCHES = {
+    "in process": sim_bench,
+    "ur": ur_bench,
+    "ur polyscope x": polyscope_x_bench,
+    "abb": abb_bench,
+    "abb egm": abb_egm_bench,
+}
 BLOCK_S = 0.05
 # the machine that runs the tests may be busy with something else for a while
 SLACK_S = 0.1

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from drivers.errors import DeviceError, DeviceUnreachable
 from drivers.ur.dashboard import DASHBOARD_PORT, Dashboard
 from drivers.ur.kinematics_info import PRIMARY_PORT, read_kinematics
+from drivers.ur.panel import StopOrder
 from drivers.ur.plausible import implausible
 from drivers.ur.reader import OUTPUTS, RtdeReader
 from drivers.ur.stop_paths import StopPaths
@@ -152,7 +153,9 @@ def test_a_dashboards_control_characters_and_length_end_at_the_driver():
 
 def test_a_stop_does_not_wait_for_a_dashboard_that_never_ends():
     with answering(DASHBOARD_PORT, again_and_again(b"y" * 65536, 0.0)) as address:
-        paths = StopPaths(address, 5.0)
+        paths = StopPaths(
+            address, 5.0, StopOrder("dashboard", DASHBOARD_PORT, b"stop\n", b"power off\n")
+        )
         paths.open()
         time.sleep(0.2)
         begin_s = time.monotonic()

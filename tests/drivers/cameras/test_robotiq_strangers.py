@@ -89,7 +89,7 @@ def test_a_picture_over_the_stated_size_is_refused_before_it_is_decoded(
 
     monkeypatch.setattr(cv2, "imdecode", never)
     with answering(lambda _: reply(jpeg_that_says(65000, 65000))) as http:
-        camera = RobotiqCamera(f"127.0.0.1:{http._connection.port}")
+        camera = RobotiqCamera(f"127.0.0.1:{http._http._connection.port}")
         with pytest.raises(DeviceRefused, match="65000 x 65000"):
             camera.connect()
         camera.close()
@@ -133,7 +133,7 @@ def test_a_setting_that_cannot_be_is_refused_by_name(name: str, value: object) -
         return reply(PICTURE)
 
     with answering(answer) as http:
-        camera = RobotiqCamera(f"127.0.0.1:{http._connection.port}")
+        camera = RobotiqCamera(f"127.0.0.1:{http._http._connection.port}")
         with pytest.raises(DeviceError, match=f"setting {name} is n"):
             camera.connect()
         camera.close()

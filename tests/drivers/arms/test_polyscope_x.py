@@ -1,0 +1,172 @@
+"""What is particular to PolyScope X: the robot API in place of the dashboard server."""
+
+import json
+import time
+from contextlib import suppress
+
+import pytest
+from benches import (
+    ROBOT_API_PORT,
+    UR_HOME,
+    best_of_three,
+    halted_s,
+    own_address,
+    quickly,
+    stays,
+    truly_moving,
+    until,
+    ur_moving,
+    ur_peer,
+    wait_steady,
+)
+
+from drivers.arm import Motion
+from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable
+from drivers.ur import URArm, URSettings
+from drivers.ur.dashboard_panel import DashboardPanel
+from drivers.ur.robot_api import RobotApi
+from drivers.ur.which_panel import panel_of
+from sim.peers.controller_faults import Stops
+from sim.peers.listener import Listener
+
+PATIENT = {"silence_s": 1.5, "watchdog_hz": 0.5, "start_timeout_s": 10.0}
+
+
+def polyscope_x(**more):
+    return ur_peer(robot_api_port=ROBOT_API_PORT, **more)
+
+
+def moving(**more):
+    return ur_moving(polyscope_x=True, **PATIENT, **more)
+
+
+def test_polyscope_5_and_x_are_told_apart_by_what_answers():
+    with ur_peer() as (five, _), polyscope_x() as (ten, _):
+        assert isinstance(panel_of(five.address, ROBOT_API_PORT), DashboardPanel)
+        assert isinstance(panel_of(ten.address, ROBOT_API_PORT), RobotApi)
+    with pytest.raises(DeviceUnreachable, match="neither the dashboard server"):
+        panel_of(own_address(), ROBOT_API_PORT)
+
+
+@pytest.mark.parametrize(
+    ("version", "told"),
+    [("5.0.107", {"robot_api", "polyscope", "model", "serial"}), ("3.1.6", {"robot_api"})],
+)
+def test_what_a_version_does_not_tell_is_left_out(version, told):
+    with polyscope_x(robot_api_version=version) as (controller, _):
+        identity = panel_of(controller.address, ROBOT_API_PORT).identity()
+    assert set(identity) == told
+    assert identity.get("model", "UR5") == "UR5"
+
+
+def test_local_mode_is_refused_with_where_to_switch():
+    with polyscope_x() as (controller, _):
+        controller.remote_control = False
+        arm = URArm(controller.address, URSettings(robot_api_port=ROBOT_API_PORT))
+        with pytest.raises(DeviceRefused, match="Remote"):
+            arm.connect()
+
+
+def test_a_stop_reaches_the_arm_over_the_robot_api_alone():
+    def measure():
+        with moving() as (arm, controller, sim):
+            arm._supervisor._stops._by_script = lambda: None
+            since_s = time.monotonic()
+            arm.stop()
+            latency_s = halted_s(controller, since_s)
+            assert [e for e in controller.events if e.what == "robot api: stop"]
+            assert until(lambda: not truly_moving(sim))
+            assert stays(sim)
+            return latency_s
+
+    best_of_three(measure, 0.1)
+
+
+def test_a_stop_finds_its_way_after_the_connections_were_dropped():
+    with moving() as (arm, controller, sim):
+        controller.drop()
+        arm.stop()
+        assert until(lambda: not truly_moving(sim), 1.0)
+        assert stays(sim)
+
+
+def test_a_stop_that_is_refused_is_repeated_until_the_watchdog_stops_the_arm():
+    with moving() as (arm, controller, sim):
+        controller.faults.stops = Stops.REFUSED
+        arm.stop()
+        orders = [event for event in controller.events if event.what == "robot api: stop"]
+        assert until(lambda: not truly_moving(sim), 6.0)
+        assert len(orders) < len([e for e in controller.events if e.what == "robot api: stop"])
+
+
+def test_recovering_from_a_protective_stop_obeys_the_five_second_rule():
+    with moving() as (arm, controller, sim):
+        controller.protective_stop()
+        assert until(lambda: arm.state().fault is not None)
+        with pytest.raises(ArmStopped, match="protective"):
+            arm.start_move(quickly(UR_HOME))
+        with pytest.raises(DeviceRefused, match="5s"):
+            arm.recover()
+        controller.wait_out_protective_stop()
+        arm.recover()
+        assert stays(sim)
+        assert arm.state().fault is None
+        arm.start_move(quickly(UR_HOME))
+        assert wait_steady(arm).joints_rad == pytest.approx(UR_HOME, abs=1e-6)
+
+
+def test_a_switch_to_local_mode_stops_the_run():
+    with moving() as (arm, controller, sim):
+        controller.remote_control = False
+        assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT, 5.0)
+        assert "local mode" in arm.state().fault
+        # its watchdog stops it: in local mode it takes no orders
+        assert until(lambda: not truly_moving(sim), 4.0)
+
+
+def answering(body, status=b"200 OK"):
+    """An HTTP server that answers everything with the same bytes."""
+
+    def serve(link):
+        with suppress(OSError):
+            while link.recv(4096):
+                head = b"HTTP/1.1 " + status + b"\r\nContent-Length: "
+                link.sendall(head + str(len(body)).encode() + b"\r\n\r\n" + body)
+
+    address = own_address()
+    return address, Listener((address, ROBOT_API_PORT), serve)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b"", b"[" * 100_000, b"null", b'{"info": {"version": 7}}', b"\xff\x00", b'{"info": []}'],
+)
+def test_another_web_server_is_no_robot_api(body):
+    address, server = answering(body)
+    try:
+        with pytest.raises(DeviceUnreachable) as refused:
+            RobotApi(address, ROBOT_API_PORT).version()
+        assert str(refused.value).isprintable()
+    finally:
+        server.close()
+
+
+def test_a_refusal_in_the_controllers_words_is_one_short_line():
+    said = json.dumps({"message": "no\x1b[2J" + "a" * 5000, "details": "because"}).encode()
+    address, server = answering(said, b"409 Conflict")
+    try:
+        refusal = RobotApi(address, ROBOT_API_PORT).unlock_protective_stop()
+        assert refusal.isprintable()
+        assert len(refusal) < 200
+    finally:
+        server.close()
+
+
+def test_a_silent_robot_api_is_given_up():
+    with polyscope_x() as (controller, _):
+        controller.faults.mute = True
+        begin_s = time.monotonic()
+        with pytest.raises(DeviceUnreachable, match="robot API"):
+            RobotApi(controller.address, ROBOT_API_PORT, 0.3).in_local_mode()
+        assert time.monotonic() - begin_s < 1.0
+        controller.faults.mute = False
