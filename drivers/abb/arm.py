@@ -1,4 +1,4 @@
-"""An ABB arm on an IRC5 controller with RobotWare 6 (IRB 140 and its like)."""
+"""An ABB arm on an IRC5 (RobotWare 6) or an OmniCore (RobotWare 7) controller."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.abb.rws import named
 from drivers.abb.settings import ABBSettings
 from drivers.abb.status import fault_in
 from drivers.abb.supervisor import Supervisor
-from drivers.abb.transport import resolved
+from drivers.abb.transport import generation_of, resolved
 from drivers.arm import ArmState, Motion, MoveTarget
 from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable, StopFailed
 from drivers.targets import check_target
@@ -51,9 +51,10 @@ class ABBArm:
         """
         self.close()
         atexit.register(self.close)
-        warn_untried(f"ABB arm at {self._address}", "a simulated IRC5 on loopback")
+        warn_untried(f"ABB arm at {self._address}", "a simulated controller on loopback")
         self._url = resolved(self._address, self._settings.certificate_sha256)
-        supervisor = Supervisor(self._url, self._settings)
+        generation = generation_of(self._url, self._settings.certificate_sha256)
+        supervisor = Supervisor(self._url, self._settings, generation)
         try:
             self._open(supervisor)
         except BaseException:

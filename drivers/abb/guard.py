@@ -16,10 +16,24 @@ from typing import Any
 _TRIES = 3
 _NO_CONTENT, _REFUSED = 204, 300
 STOP, MOTORS_OFF = "stop", "motors off"
-_ORDERS = (
-    ("rw/rapid/execution?action=stop", {"stopmode": "stop"}),
-    ("rw/panel/ctrlstate?action=setctrlstate", {"ctrl-state": "motoroff"}),
-)
+_RAPID_STOP, _MOTORS_OFF = {"stopmode": "stop"}, {"ctrl-state": "motoroff"}
+_ORDERS = {
+    1: (
+        ("rw/rapid/execution?action=stop&json=1", _RAPID_STOP),
+        ("rw/panel/ctrlstate?action=setctrlstate&json=1", _MOTORS_OFF),
+    ),
+    2: (
+        ("rw/rapid/execution/stop", _RAPID_STOP),
+        ("rw/panel/ctrl-state", _MOTORS_OFF),
+    ),
+}
+_HEADERS = {
+    1: {},
+    2: {
+        "Accept": "application/hal+json;v=2.0",
+        "Content-Type": "application/x-www-form-urlencoded;v=2.0",
+    },
+}
 
 
 def plain(fingerprint: str) -> str:
@@ -75,6 +89,8 @@ class StopSession:
         Of every request.
     certificate_sha256:
         Fingerprint of the certificate that is trusted; None for HTTP.
+    generation:
+        1 for Robot Web Services 1.0 (IRC5, digest login), 2 for 2.0 (OmniCore, basic login).
     """
 
     def __init__(
@@ -84,13 +100,16 @@ class StopSession:
         password: str,
         timeout_s: float,
         certificate_sha256: str | None = None,
+        generation: int = 1,
     ) -> None:
-        from requests.auth import HTTPDigestAuth
+        from requests.auth import HTTPBasicAuth, HTTPDigestAuth
 
         self._url = url
+        self._generation = generation
         self._timeout_s = timeout_s
         self._session = session_for(certificate_sha256)
-        self._session.auth = HTTPDigestAuth(user, password)
+        login = HTTPDigestAuth if generation == 1 else HTTPBasicAuth
+        self._session.auth = login(user, password)
 
     def log_in(self) -> None:
         """Make the first request, which costs the challenge; raises `OSError`."""
@@ -102,7 +121,7 @@ class StopSession:
         `motors_off` switches them off even where RAPID's stop was taken.
         """
         why = ""
-        for path, payload in _ORDERS:
+        for path, payload in _ORDERS[self._generation]:
             refusal = self._post(path, payload)
             if refusal is None and not motors_off:
                 return None
@@ -113,8 +132,7 @@ class StopSession:
         why = ""
         for _ in range(_TRIES):
             try:
-                address = f"{self._url}/{path}&json=1"
-                status = self._ask("POST", address, payload)
+                status = self._ask("POST", f"{self._url}/{path}", payload)
             except OSError as error:
                 why = type(error).__name__
                 continue
@@ -127,6 +145,7 @@ class StopSession:
             method,
             address,
             data=payload,
+            headers=_HEADERS[self._generation],
             timeout=self._timeout_s,
             allow_redirects=False,
             stream=True,

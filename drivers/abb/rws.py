@@ -1,4 +1,4 @@
-"""Robot Web Services through abb-robot-client, with what that library leaves out.
+"""Robot Web Services 1.0 through abb-robot-client, with what that library leaves out; or 2.0.
 
 It sets no time-out on any request, raises a bare `KeyError` for a wrong password and a bare
 `Exception` for most else; here every request is bounded and every error has a name.
@@ -13,8 +13,9 @@ from typing import Any
 
 from drivers.abb.guard import session_for
 from drivers.abb.login import Login
+from drivers.abb.rws2 import Rws2
 from drivers.abb.settings import ABBSettings
-from drivers.abb.transport import read_whole
+from drivers.abb.transport import OMNICORE, read_whole
 from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable
 from drivers.outside import printable
 
@@ -26,8 +27,13 @@ class Cancelled(Exception):
     """A request was not sent, since a stop came in between."""
 
 
-def open_rws(url: str, settings: ABBSettings, before_request: BeforeRequest | None = None) -> Any:
-    """Return an `abb_robot_client.rws.RWS` whose every request is bounded.
+def open_rws(
+    url: str,
+    settings: ABBSettings,
+    generation: int,
+    before_request: BeforeRequest | None = None,
+) -> Any:
+    """Return an `abb_robot_client.rws.RWS`, or an `Rws2`, whose every request is bounded.
 
     Parameters
     ----------
@@ -35,6 +41,8 @@ def open_rws(url: str, settings: ABBSettings, before_request: BeforeRequest | No
         Such as ``http://192.168.125.1``.
     settings:
         Login, certificate and time-outs.
+    generation:
+        See `drivers.abb.transport.generation_of`.
     before_request:
         Called with method and URL before each request; may raise `Cancelled`.
     """
@@ -46,7 +54,6 @@ def open_rws(url: str, settings: ABBSettings, before_request: BeforeRequest | No
             f"ABB arm {url}: {error}: pip install 'calibration-cell[abb]'"
         ) from None
     login = login_in(url, settings)
-    rws = RWS(url, login.user, login.password)
     session = session_for(settings.certificate_sha256)
     send = session.request
     bounds = (settings.connect_timeout_s, settings.read_timeout_s)
@@ -59,6 +66,9 @@ def open_rws(url: str, settings: ABBSettings, before_request: BeforeRequest | No
         return read_whole(send(method, address, **more), deadline_s)
 
     session.request = request
+    if generation == OMNICORE:
+        return Rws2(url, session, login)
+    rws = RWS(url, login.user, login.password)
     # the library offers no other place for a time-out
     rws._session = session  # noqa: SLF001
     return rws
@@ -91,8 +101,8 @@ def named(url: str) -> Iterator[None]:
     except OSError as error:  # of which everything that `requests` raises is a kind
         raise DeviceUnreachable(
             f"ABB arm {url}: Robot Web Services do not answer ({type(error).__name__}). Check "
-            "power, cable (service or WAN port), address, and option 616-1 PC Interface; an "
-            "OmniCore controller (RobotWare 7) speaks RWS 2.0, which this driver does not"
+            "power, cable (service or WAN port), address, and option 616-1 PC Interface (IRC5) or "
+            "the firewall of the network that the cable is in (OmniCore: Connected Services)"
         ) from None
     except KeyError as error:
         raise DeviceRefused(

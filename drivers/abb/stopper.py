@@ -35,7 +35,7 @@ class Stopper:
         None, or why the newest stop was not taken.
     """
 
-    def __init__(self, url: str, settings: ABBSettings) -> None:
+    def __init__(self, url: str, settings: ABBSettings, generation: int) -> None:
         self._url = url
         login = login_in(url, settings)
         options: dict[str, Any] = {
@@ -44,6 +44,7 @@ class Stopper:
             "password": login.password,
             "timeout_s": settings.read_timeout_s,
             "certificate_sha256": settings.certificate_sha256,
+            "generation": generation,
         }
         self._session = StopSession(**options)
         self._login = json.dumps(options)

@@ -27,6 +27,7 @@ from drivers.abb.pace import Pace
 from drivers.abb.program import build_program, missed
 from drivers.abb.readings import Reading, read_rws
 from drivers.abb.rws import Cancelled, named, open_rws
+from drivers.abb.rws2 import Rws2
 from drivers.abb.settings import ABBSettings
 from drivers.abb.status import failure_in_log, fault_in
 from drivers.abb.stopper import Stopper
@@ -39,7 +40,7 @@ _STOP_CONFIRM_S = 2.0
 _MOTORS_OFF_S = 0.7
 _CLOSE_S = 1.0
 _START_S = 0.5  # between the answer to a start and the motion
-_START_ACTION = "rapid/execution?action=start"
+_START_ACTIONS = ("rapid/execution?action=start", "rapid/execution/start")  # of RWS 1.0 and 2.0
 
 
 @dataclass
@@ -61,11 +62,11 @@ class Supervisor:
         The newest reading.
     """
 
-    def __init__(self, url: str, settings: ABBSettings) -> None:
+    def __init__(self, url: str, settings: ABBSettings, generation: int) -> None:
         self._url = url
         self._settings = settings
-        self._rws = open_rws(url, settings, self._check_cancelled)
-        self._stopper = Stopper(url, settings)
+        self._rws = open_rws(url, settings, generation, self._check_cancelled)
+        self._stopper = Stopper(url, settings, generation)
         self._watch = LinkWatch(url, self._rws, settings.link_watch_s)
         self._pace = Pace(settings.poll_s)
         self._lock = threading.RLock()
@@ -141,9 +142,12 @@ class Supervisor:
         self._stopper.close()
         if self._thread.is_alive():
             self._thread.join(timeout=_CLOSE_S)
+        # a session that hangs in a request cannot be asked to give its mastership back
+        if isinstance(self._rws, Rws2) and not self._thread.is_alive():
+            self._rws.close()
 
     def _check_cancelled(self, method: str, address: str) -> None:
-        if _START_ACTION not in address:
+        if not any(action in address for action in _START_ACTIONS):
             return
         if self._cancelled.is_set() or self._closing:
             raise Cancelled(method)

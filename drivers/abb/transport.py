@@ -12,13 +12,15 @@ import time
 from typing import Any
 from urllib.parse import urlsplit
 
-from drivers.abb.guard import bare_tls, plain
-from drivers.errors import DeviceRefused
+from drivers.abb.guard import bare_tls, plain, session_for
+from drivers.errors import DeviceRefused, DeviceUnreachable
 
 _HANDSHAKE_S = 1.0
 _HTTPS_PORT, _HTTP_PORT = 443, 80
 LARGEST_ANSWER_BYTES = 1 << 24
 _CHUNK_BYTES = 1 << 16
+IRC5, OMNICORE = 1, 2
+_GENERATIONS = {"digest": IRC5, "basic": OMNICORE}
 
 
 def certificate_of(host: str, port: int) -> str | None:
@@ -66,6 +68,41 @@ def resolved(address: str, certificate_sha256: str | None) -> str:
         return f"http://{url.hostname}:{url.port or _HTTP_PORT}"
     _check(f"ABB arm {url.hostname}", shown, certificate_sha256)
     return f"https://{url.hostname}:{secure_port}"
+
+
+def generation_of(url: str, certificate_sha256: str | None) -> int:
+    """Return which Robot Web Services answer: `IRC5` (RobotWare 6) or `OMNICORE` (RobotWare 7).
+
+    They are told apart by the login that they ask for, before any is sent.
+
+    Raises
+    ------
+    DeviceUnreachable
+        No answer.
+    DeviceRefused
+        Neither of them answers, or the password would go over the wire in the open.
+    """
+    session = session_for(certificate_sha256)
+    try:
+        with session.get(
+            f"{url}/rw/system", timeout=_HANDSHAKE_S, allow_redirects=False, stream=True
+        ) as answer:
+            asked = str(answer.headers.get("WWW-Authenticate", "")).split(" ")[0].lower()
+    except OSError as error:
+        raise DeviceUnreachable(
+            f"ABB arm {url}: Robot Web Services do not answer ({type(error).__name__}). Check "
+            "power, cable (service or WAN port) and address"
+        ) from None
+    finally:
+        session.close()
+    if asked == "basic" and not url.startswith("https"):
+        raise DeviceRefused(
+            f"ABB arm {url}: asks for a password in the open, which a controller does not; see what"
+            " answers there"
+        )
+    if asked not in _GENERATIONS:
+        raise DeviceRefused(f"ABB arm {url}: what answers are not Robot Web Services")
+    return _GENERATIONS[asked]
 
 
 def _check(arm: str, shown: str | None, trusted: str | None) -> None:

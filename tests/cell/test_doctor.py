@@ -13,6 +13,7 @@ from cell.verbs.doctor import examine
 from cell.verbs.doctor.finding import Finding
 from drivers import aravis_network
 from drivers.abb import ABBArm
+from drivers.abb.transport import certificate_of
 from drivers.aravis import AravisCamera
 from drivers.genicam_settings import FeatureNames
 from drivers.robotiq import RobotiqCamera
@@ -151,6 +152,21 @@ def test_a_controller_that_does_not_watch_the_link_is_named(
     )
     assert not without.blocks
     assert "a cut cable stops nothing" in without.line()
+
+
+def test_robotware_6_and_robotware_7_are_told_apart(tmp_path: Path, abb: ABBController) -> None:
+    assert "RobotWare 6" in by_name(examine(abb_cell(tmp_path, abb)), "ABB controller").line()
+    arm = SimArm(kinematics_of("irb140"), WallClock(), np.zeros(6))
+    with ABBController(arm, "127.0.0.81", omnicore=True) as newer:
+        login = by_name(examine(abb_cell(tmp_path, newer)), "ABB login")
+        assert login.blocks
+        shown = certificate_of(newer.address, newer.port)
+        assert f"certificate_sha256: {shown}" in login.line()
+        more = f"factory_password: true, certificate_sha256: {shown}"
+        findings = examine(abb_cell(tmp_path, newer, more))
+        assert not [finding.line() for finding in findings if finding.blocks]
+        assert "RobotWare 7" in by_name(findings, "ABB controller").line()
+        assert by_name(findings, "ABB HTTPS").ready
 
 
 def test_a_wrong_password_is_named(tmp_path: Path, abb: ABBController) -> None:

@@ -26,19 +26,22 @@ def abb(robot: AbbRobot) -> list[Finding]:
 def _state(robot: AbbRobot) -> list[Finding]:
     from drivers.abb.rws import named, open_rws
     from drivers.abb.status import fault_in
-    from drivers.abb.transport import resolved
+    from drivers.abb.transport import OMNICORE, generation_of, resolved
 
     try:
         settings = abb_settings(robot)
         url = resolved(robot.address, robot.certificate_sha256)
-        rws = open_rws(url, settings)
+        generation = generation_of(url, robot.certificate_sha256)
+        rws = open_rws(url, settings, generation)
         with named(url):
             fault = fault_in(rws)
             execution = str(rws.get_execution_state().ctrlexecstate)
     except (DeviceError, InputError) as refusal:
         return [Finding("ABB login", False, str(refusal), "correct what it says")]
     watch = LinkWatch(url, rws, settings.link_watch_s)
+    kind = "OmniCore (RobotWare 7, RWS 2.0)" if generation == OMNICORE else "IRC5 (RobotWare 6)"
     return [
+        Finding("ABB controller", True, kind),
         _secured(url),
         _link_watch(watch, robot.link_watch),
         Finding("ABB mode and motors", fault is None, fault or "automatic, motors on", "see there"),

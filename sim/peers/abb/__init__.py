@@ -1,4 +1,4 @@
-"""An ABB IRC5 controller on loopback."""
+"""An ABB IRC5 or OmniCore controller on loopback."""
 
 from sim.peers.abb.controller import ABBController
 

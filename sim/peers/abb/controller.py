@@ -1,4 +1,7 @@
-"""An ABB IRC5 controller (RobotWare 6) on loopback: RWS 1.0 over HTTP, EGM feedback over UDP."""
+"""An ABB controller on loopback: Robot Web Services over HTTP, EGM feedback over UDP.
+
+An IRC5 (RobotWare 6) speaks RWS 1.0, an OmniCore (RobotWare 7) RWS 2.0 over HTTPS.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,9 @@ class ABBController:
     port:
         For HTTP; the real controller's is 80, which an ordinary user may not open.
     https:
-        Speak HTTPS on that port, not HTTP.
+        Speak HTTPS on that port, not HTTP; an OmniCore does anyway.
+    omnicore:
+        Speak RWS 2.0.
     egm_port:
         Where to send EGM feedback while a program runs; None for nowhere.
 
@@ -69,11 +74,12 @@ class ABBController:
         egm_port: int | None = None,
         *,
         https: bool = False,
+        omnicore: bool = False,
     ) -> None:
         self.arm = arm
         self.address = address
         self.port = port
-        self._https = https
+        self._https, self._omnicore = https or omnicore, omnicore
         self.panel = PanelState()
         self.faults = ABBFaults()
         self.reported = Reported(arm.state, lambda: self.faults)
@@ -95,7 +101,9 @@ class ABBController:
 
     def __enter__(self) -> ABBController:
         self.arm.connect()
-        self._http = RwsServer((self.address, self.port), self, https=self._https)
+        self._http = RwsServer(
+            (self.address, self.port), self, https=self._https, omnicore=self._omnicore
+        )
         self.watch.start()
         if self._egm is not None:
             self._egm.start()

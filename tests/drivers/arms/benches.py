@@ -16,6 +16,7 @@ from scipy.spatial.transform import RigidTransform
 
 from calib.chain.kinematics import arm as kinematics_of
 from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings
+from drivers.abb.transport import certificate_of
 from drivers.arm import Arm, ArmState, Motion, MoveTarget
 from drivers.errors import DeviceUnreachable, StopFailed
 from drivers.ur import URArm, URSettings
@@ -126,9 +127,9 @@ ABB_HOME = (0.1, 0.2, -0.3, 0.1, 0.6, 0.2)
 
 
 @contextmanager
-def abb_peer(egm_port: int | None = None) -> Iterator[tuple[ABBController, SimArm]]:
+def abb_peer(egm_port: int | None = None, **more: Any) -> Iterator[tuple[ABBController, SimArm]]:
     sim = simulated("irb140", ABB_HOME)
-    with ABBController(sim, own_address(), egm_port=egm_port) as controller:
+    with ABBController(sim, own_address(), egm_port=egm_port, **more) as controller:
         yield controller, sim
 
 
@@ -139,11 +140,11 @@ def free_udp_port() -> int:
 
 
 @contextmanager
-def abb_bench(egm: bool = False) -> Iterator[Bench]:
+def abb_bench(egm: bool = False, omnicore: bool = False) -> Iterator[Bench]:
     port = free_udp_port() if egm else None
     with ExitStack() as stack:
-        controller, sim = stack.enter_context(abb_peer(port))
-        arm = ABBArm(controller.url, ABBSettings(login=FACTORY_LOGIN, egm_port=port))
+        controller, sim = stack.enter_context(abb_peer(port, omnicore=omnicore))
+        arm = ABBArm(controller.url, abb_settings(controller, egm_port=port))
         stack.callback(arm.close)
         yield Bench(
             arm,
@@ -154,6 +155,18 @@ def abb_bench(egm: bool = False) -> Iterator[Bench]:
             controller.kill,
             lambda: [event.t_s for event in controller.events if event.what.startswith("halt")],
         )
+
+
+def abb_settings(controller: ABBController, **more: Any) -> ABBSettings:
+    """A login, and the controller's certificate where it shows one."""
+    shown = certificate_of(controller.address, controller.port)
+    return ABBSettings(login=FACTORY_LOGIN, certificate_sha256=shown, **more)
+
+
+@contextmanager
+def omnicore_bench() -> Iterator[Bench]:
+    with abb_bench(omnicore=True) as bench:
+        yield bench
 
 
 @contextmanager

@@ -220,7 +220,7 @@ def test_a_password_does_not_belong_in_a_cell_file():
 
 def test_a_slow_answer_is_given_up():
     with controller() as peer:
-        rws = open_rws(peer.url, ABBSettings(login=FACTORY_LOGIN, read_timeout_s=0.3))
+        rws = open_rws(peer.url, ABBSettings(login=FACTORY_LOGIN, read_timeout_s=0.3), 1)
         rws.get_execution_state()
         peer.faults.mute = True
         begin_s = time.monotonic()

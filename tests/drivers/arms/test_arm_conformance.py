@@ -8,6 +8,7 @@ import pytest
 from benches import (
     abb_bench,
     abb_egm_bench,
+    omnicore_bench,
     polyscope_x_bench,
     quickly,
     sim_bench,
@@ -27,6 +28,7 @@ BENCHES = {
     "ur polyscope x": polyscope_x_bench,
     "abb": abb_bench,
     "abb egm": abb_egm_bench,
+    "abb omnicore": omnicore_bench,
 }
 BLOCK_S = 0.05
 # the machine that runs the tests may be busy with something else for a while

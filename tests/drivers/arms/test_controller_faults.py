@@ -149,7 +149,7 @@ def test_old_readings_let_the_clock_go_on():
 
 def test_old_readings_come_through_robot_web_services_too():
     with abb_moving() as (controller, sim, _):
-        rws = open_rws(controller.url, ABBSettings(login=FACTORY_LOGIN))
+        rws = open_rws(controller.url, ABBSettings(login=FACTORY_LOGIN), 1)
         rws.get_jointtarget()
         controller.faults.old_readings = True
         before = rws.get_jointtarget().robax.tolist()
