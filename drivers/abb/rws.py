@@ -15,8 +15,8 @@ from drivers.abb.guard import session_for
 from drivers.abb.login import Login
 from drivers.abb.rws2 import Rws2
 from drivers.abb.settings import ABBSettings
-from drivers.abb.transport import OMNICORE, read_whole
-from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable
+from drivers.abb.transport import OMNICORE, read_whole, silent
+from drivers.errors import DeviceError, DeviceRefused
 from drivers.outside import printable
 
 _LONGEST_S = 5.0  # of one answer, however slowly it comes
@@ -99,11 +99,7 @@ def named(url: str) -> Iterator[None]:
     except (DeviceError, Cancelled):
         raise
     except OSError as error:  # of which everything that `requests` raises is a kind
-        raise DeviceUnreachable(
-            f"ABB arm {url}: Robot Web Services do not answer ({type(error).__name__}). Check "
-            "power, cable (service or WAN port), address, and option 616-1 PC Interface (IRC5) or "
-            "the firewall of the network that the cable is in (OmniCore: Connected Services)"
-        ) from None
+        raise silent(url, error) from None
     except KeyError as error:
         raise DeviceRefused(
             f"ABB arm {url}: unexpected answer (no {printable(str(error))}). "

@@ -89,10 +89,7 @@ def generation_of(url: str, certificate_sha256: str | None) -> int:
         ) as answer:
             asked = str(answer.headers.get("WWW-Authenticate", "")).split(" ")[0].lower()
     except OSError as error:
-        raise DeviceUnreachable(
-            f"ABB arm {url}: Robot Web Services do not answer ({type(error).__name__}). Check "
-            "power, cable (service or WAN port) and address"
-        ) from None
+        raise silent(url, error) from None
     finally:
         session.close()
     if asked == "basic" and not url.startswith("https"):
@@ -103,6 +100,15 @@ def generation_of(url: str, certificate_sha256: str | None) -> int:
     if asked not in _GENERATIONS:
         raise DeviceRefused(f"ABB arm {url}: what answers are not Robot Web Services")
     return _GENERATIONS[asked]
+
+
+def silent(url: str, error: Exception) -> DeviceUnreachable:
+    """The error for a controller whose web server does not answer."""
+    return DeviceUnreachable(
+        f"ABB arm {url}: Robot Web Services do not answer ({type(error).__name__}). Check power, "
+        "cable (service or WAN port), address, and option 616-1 PC Interface (IRC5) or the "
+        "network that Connected Services lets through (OmniCore)"
+    )
 
 
 def _check(arm: str, shown: str | None, trusted: str | None) -> None:
