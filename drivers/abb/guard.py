@@ -113,7 +113,8 @@ class StopSession:
 
     def log_in(self) -> None:
         """Make the first request, which costs the challenge; raises `OSError`."""
-        self._ask("GET", f"{self._url}/rw/rapid/execution?json=1")
+        # read, so that the connection stands open for the stop and no handshake is in its way
+        self._ask("GET", f"{self._url}/rw/rapid/execution?json=1", read=True)
 
     def stop(self, *, motors_off: bool = False) -> str | None:
         """Stop RAPID, or else the motors; return None, or why neither could be done.
@@ -139,8 +140,19 @@ class StopSession:
             return None if status < _REFUSED else f"the controller refuses (HTTP {status})"
         return why
 
-    def _ask(self, method: str, address: str, payload: dict[str, str] | None = None) -> int:
-        """Return the status of an answer; whatever follows it is not waited for."""
+    def _ask(
+        self,
+        method: str,
+        address: str,
+        payload: dict[str, str] | None = None,
+        *,
+        read: bool = False,
+    ) -> int:
+        """Return the status of an answer.
+
+        Whatever follows it is not waited for, and the connection is given up with it, unless it
+        is to be `read`.
+        """
         answer = self._session.request(
             method,
             address,
@@ -150,7 +162,9 @@ class StopSession:
             allow_redirects=False,
             stream=True,
         )
-        if answer.status_code != _NO_CONTENT:
+        if read or answer.status_code == _NO_CONTENT:
+            _ = answer.content
+        else:
             answer.close()
         return int(answer.status_code)
 
