@@ -17,7 +17,7 @@ class DashboardPanel:
         Of every question.
     """
 
-    def __init__(self, host: str, timeout_s: float = 1.5) -> None:
+    def __init__(self, host: str, timeout_s: float = 2.0) -> None:
         self._dashboard, self._timeout_s = Dashboard(host), timeout_s
 
     @property

@@ -35,7 +35,7 @@ class RobotApi:
         Of every question.
     """
 
-    def __init__(self, host: str, port: int = ROBOT_API_PORT, timeout_s: float = 1.5) -> None:
+    def __init__(self, host: str, port: int = ROBOT_API_PORT, timeout_s: float = 2.0) -> None:
         self._host, self._port, self._timeout_s = host, port, timeout_s
         self._http = BoundedHttp(host, port, _LARGEST_ANSWER_BYTES)
         self._lock = threading.Lock()

@@ -56,9 +56,17 @@ def test_a_silent_robot_is_in_the_way(tmp_path: Path) -> None:
     assert "check power" in blocking[0].line()
 
 
+def standing(model: str) -> SimArm:
+    """An arm whose kinematics are compiled now, not while somebody waits for an answer."""
+    arm = SimArm(kinematics_of(model), WallClock(), np.zeros(6))
+    arm.connect()
+    arm.state()
+    return arm
+
+
 @pytest.fixture
 def ur() -> Iterator[URController]:
-    arm = SimArm(kinematics_of("ur5e"), WallClock(), np.zeros(6))
+    arm = standing("ur5e")
     with URController(arm, "127.0.0.78") as controller:
         yield controller
 
@@ -82,7 +90,7 @@ def test_polyscope_5_and_polyscope_x_are_told_apart(tmp_path: Path, ur: URContro
         "dashboard server: URSoftware 5.12"
         in by_name(examine(ur_cell(tmp_path, ur)), "UR controller").line()
     )
-    arm = SimArm(kinematics_of("ur5e"), WallClock(), np.zeros(6))
+    arm = standing("ur5e")
     with URController(arm, "127.0.0.79", robot_api_port=8080) as newer:
         cell = cell_with(
             tmp_path,
@@ -117,7 +125,7 @@ def test_a_protective_stop_and_a_tool_in_millimetres_are_named(
 
 @pytest.fixture
 def abb() -> Iterator[ABBController]:
-    arm = SimArm(kinematics_of("irb140"), WallClock(), np.zeros(6))
+    arm = standing("irb140")
     with ABBController(arm, "127.0.0.80") as controller:
         yield controller
 
@@ -156,7 +164,7 @@ def test_a_controller_that_does_not_watch_the_link_is_named(
 
 def test_robotware_6_and_robotware_7_are_told_apart(tmp_path: Path, abb: ABBController) -> None:
     assert "RobotWare 6" in by_name(examine(abb_cell(tmp_path, abb)), "ABB controller").line()
-    arm = SimArm(kinematics_of("irb140"), WallClock(), np.zeros(6))
+    arm = standing("irb140")
     with ABBController(arm, "127.0.0.81", omnicore=True) as newer:
         login = by_name(examine(abb_cell(tmp_path, newer)), "ABB login")
         assert login.blocks

@@ -78,7 +78,7 @@ class RtdeServer:
             # a client that did not get its registers may write to them all the same
             if 1 <= payload[0] <= len(client.inputs):
                 recipe = client.inputs[payload[0] - 1]
-                # ur-rtde 1.6.5 sends getForwardKinematics(q, tcp_offset) on a recipe of half the
+                # ur-rtde 1.6.5 sends getForwardKinematics(q, [0] * 6) on a recipe of half the
                 # length; what the recipe has no names for is taken as not there
                 body = payload[1 : 1 + recipe.size]
                 if len(body) == recipe.size:
