@@ -22,6 +22,7 @@ _PROMISES = -12.0
 """A scatter that a law explains looks like noise to the score test, which then falls short."""
 
 _LEAST_GAIN = 18.0
+_ABOUT_AS_GOOD = 3.0
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,19 @@ def demanded(search: Search) -> list[Tried]:
     tried = fitted(fit, search, promising(fit, search))
     if not tried or search.best.criterion - tried[0].trial.criterion < DEMAND:
         return []
-    return [t for t in tried if t.trial.criterion < tried[0].trial.criterion + UNDECIDED]
+    near = [t for t in tried if t.trial.criterion < tried[0].trial.criterion + UNDECIDED]
+    return shortest_first(near)
+
+
+def shortest_first(tried: Sequence[Tried]) -> list[Tried]:
+    """The laws with the one along fewest covariates in front, of those about as good as the best.
+
+    The price of a choice is an average one: a covariate that resembles another is had for less.
+    """
+    best = min(t.trial.criterion for t in tried)
+    about = [t for t in tried if t.trial.criterion < best + _ABOUT_AS_GOOD]
+    front = min(about, key=lambda t: (len(t.found.law.covariates), t.trial.criterion))
+    return [front, *(t for t in tried if t is not front)]
 
 
 def law_leads(search: Search) -> bool:

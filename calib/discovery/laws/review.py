@@ -9,7 +9,7 @@ import numpy as np
 from calib.chain.effect import Present
 from calib.chain.effects import catalogue
 from calib.chain.empirical import UNNAMED
-from calib.discovery.laws.contest import Tried, as_cell, fitted, promising
+from calib.discovery.laws.contest import Tried, as_cell, fitted, promising, shortest_first
 from calib.discovery.laws.cross_validation import CrossValidation
 from calib.discovery.laws.frames import frame_blocks
 from calib.discovery.locate import Cell
@@ -39,7 +39,7 @@ def replaced_by_laws(search: Search) -> list[Cell]:
         tried = fitted(without, search, laws)
         if not tried or tried[0].trial.criterion > search.best.criterion:
             continue
-        cells.append(_put_in(search, tried, label))
+        cells.append(_put_in(search, shortest_first(tried), label))
     return cells
 
 
