@@ -1,12 +1,12 @@
-"""CPU time and memory of the solver beside OpenCV's and mrcal's, on the same data.
+"""CPU time and memory of the solver beside OpenCV's, COLMAP's and mrcal's, on the same data.
 
     python -m benchmarks.solver_speed [REPEATS]
 
 Camera 4096 x 3072, alpha 4750 px, k1 k2 p1 p2, 14 x 14 corners, noise 0.1 px, 0.35 to 1 m, tilts 0
 to 45 degrees. CPU seconds are user and system time of all threads, the least of the repeats, after
-one small fit that loads what is compiled. Ours and OpenCV find their own start; mrcal is given
-ours, whose time is told by itself.
-mrcal is asked in `.mrcal` (see `tools/install-mrcal`) and left out where it is missing.
+one small fit that loads what is compiled. Ours and OpenCV (with `CALIB_USE_LU`) find their own
+start; COLMAP and mrcal are given ours, whose time is told by itself.
+mrcal is asked in `.mrcal` (see `tools/install-mrcal`); a peer that is missing is left out.
 Every fit runs in a process of its own, which loads no more than its work needs. Memory is that
 process's greatest resident set, what it held before it had any data, and how much of it were pages
 of library files, which all processes share and of which the kernel maps more or fewer at a time as
@@ -86,19 +86,6 @@ def fitted(corners: FloatArray, row: FloatArray, poses: FloatArray) -> FloatArra
     return fit.optics[0, [COLUMN[name] for name in FREE]]
 
 
-def opencv(corners: FloatArray) -> FloatArray:
-    """(8,) OpenCV's optimum."""
-    import cv2
-
-    points = [BOARD.corners_m.astype(np.float32)] * len(corners)
-    seen = [c.astype(np.float32) for c in corners]
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
-    _, A, k, *_ = cv2.calibrateCamera(
-        points, seen, (WIDTH, HEIGHT), None, None, flags=cv2.CALIB_FIX_K3, criteria=criteria
-    )
-    return np.array([A[0, 0], A[1, 1], A[0, 2], A[1, 2], *np.ravel(k)[:4]])
-
-
 def memory_mb(what: str) -> float:
     """What the kernel tells of this process's memory: `VmHWM` is the greatest resident set."""
     # getrusage would count what the parent held when it forked
@@ -132,11 +119,6 @@ def child(what: str, frames: int, repeats: int) -> dict[str, Any]:
         cell = joint_cell(frames)
         return measured(lambda: normal_equations(*cell), repeats, before_mb)
     few = observed(10)[0]
-    if what == "opencv":
-        opencv(few)
-        before_mb = memory_mb("VmHWM")
-        corners = observed(frames)[0]
-        return measured(lambda: opencv(corners), repeats, before_mb)
     fitted(few, *start(few))
     before_mb = memory_mb("VmHWM")
     corners = observed(frames)[0]
@@ -145,10 +127,15 @@ def child(what: str, frames: int, repeats: int) -> dict[str, Any]:
     return measured(lambda: fitted(corners, *start(corners)), repeats, before_mb)
 
 
-def mrcal(frames: int, repeats: int) -> dict[str, Any] | None:
-    """mrcal's own measurement in its own interpreter, from our start; None without it."""
-    if not MRCAL.exists():
-        return None
+PEERS = {
+    "opencv": [sys.executable, str(Path(__file__).with_name("solver_speed_peers.py")), "opencv"],
+    "colmap": [sys.executable, str(Path(__file__).with_name("solver_speed_peers.py")), "colmap"],
+    "mrcal": [str(MRCAL), str(Path(__file__).with_name("solver_speed_mrcal.py"))],
+}
+
+
+def peers(frames: int, repeats: int) -> dict[str, dict[str, Any] | None]:
+    """The peers' own measurements, each in its own process, from our start where it has none."""
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "data.npz"
         corners, _ = observed(frames)
@@ -162,8 +149,10 @@ def mrcal(frames: int, repeats: int) -> dict[str, Any] | None:
             square_m=BOARD.square_m,
             size=[WIDTH, HEIGHT],
         )
-        script = Path(__file__).with_name("solver_speed_mrcal.py")
-        return answer([str(MRCAL), str(script), str(data), str(repeats)])
+        return {
+            name: answer([*command, str(data), str(repeats)]) if Path(command[0]).exists() else None
+            for name, command in PEERS.items()
+        }
 
 
 def answer(command: list[str]) -> dict[str, Any] | None:
@@ -188,9 +177,8 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|")
     for frames, goal in FIT_GOAL_S.items():
         found = {
-            who: answer([*me, who, str(frames), str(repeats)])
-            for who in ("ours", "start", "opencv")
-        } | {"mrcal": mrcal(frames, repeats)}
+            who: answer([*me, who, str(frames), str(repeats)]) for who in ("ours", "start")
+        } | peers(frames, repeats)
         ours = found["ours"]
         for who, one in found.items():
             if one is None or ours is None:
@@ -210,6 +198,7 @@ NAMES = {
     "ours": "ours, with its start",
     "start": "our start alone",
     "opencv": "OpenCV, with its start",
+    "colmap": "COLMAP (Ceres), from our start",
     "mrcal": "mrcal, from our start",
 }
 
