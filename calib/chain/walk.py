@@ -31,7 +31,7 @@ class Walk:
     joints_rad:
         (N, J) where the joints truly are; clock and arm effects move them.
     dh_offset:
-        (J, 4) corrections of the Denavit-Hartenberg rows, or None.
+        (J, 5) corrections of the Denavit-Hartenberg rows, or None.
     base_from_flange:
         (N, 4, 4) where the flange truly is.
     flange_from_mounted, base_from_fixed:

@@ -82,20 +82,27 @@ def _written(cell: Path, path: Path, wish: Requirements) -> Plan:
 
 
 def _tell(plan: Plan, *, as_json: bool) -> None:
-    from cell.verbs.plan import expected_uncertainty, power
+    from cell.verbs.plan import clearance, expected_uncertainty, power
 
     stations = [view.station for view in plan.file.views]
     counts = {kind: stations.count(kind) for kind in ("parallel", "varied")}
+    near = clearance.of_plan(plan)
     promised, seen = expected_uncertainty.expected_from(plan), power.power_of(plan)
     result = {
         "plan": str(plan.path),
         "views": len(stations),
         **counts,
+        "clearance": clearance.as_mapping(near),
         "expected": expected_uncertainty.as_mapping(promised),
         "effects": power.as_shares(seen),
     }
     head = f"{plan.path}: {counts['parallel']} parallel and {counts['varied']} tilted views"
-    lines = [head, *expected_uncertainty.as_lines(promised), *power.as_lines(seen)]
+    lines = [
+        head,
+        clearance.as_line(near),
+        *expected_uncertainty.as_lines(promised),
+        *power.as_lines(seen),
+    ]
     show("\n".join(lines), result, as_json=as_json)
 
 

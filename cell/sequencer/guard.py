@@ -1,24 +1,25 @@
-"""What is checked before the arm may move: reach, joint limits, boxes along the path, speed."""
+"""What is checked before the arm may move: reach, joint limits, bodies along the path, speed."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
+from calib.bodies import Nearest, Scene
 from calib.chain.kinematics import MODELS, ArmKinematics, OutOfReach, UnknownArm, arm
-from calib.views import Board, FloatArray
+from calib.views import FloatArray
 from cell.errors import InputError
+from cell.sequencer.bodies import WORKSPACE, outline_m, scene_of
 from cell.storage.files.cell_file import CellFile
-from cell.storage.files.parts import Box
 from cell.storage.files.plan_file import Plan
 from drivers.arm import MoveTarget
 from drivers.errors import SafetyError
 
 _STEP_RAD = np.radians(3.0)
-_MOVING_FRAMES = slice(2, None)
-"""Base and shoulder stand where the robot was bolted down; everything after them sweeps."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,15 @@ class Guard:
         Arm, layout, workspace and keep-out boxes.
     speed_m_s, joint_speed_rad_s:
         Greatest speed of flange and camera, and of any joint.
+    spare_m:
+        Room for what stands in the cell, in addition to the cell's `clearance_m`.
     """
 
     cell: CellFile
     speed_m_s: float
     joint_speed_rad_s: float
+    spare_m: float = field(default=0.0, kw_only=True)
+    _answers: dict[bytes, bool] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @classmethod
     def of(cls, plan: Plan) -> Guard:
@@ -62,6 +67,16 @@ class Guard:
                 f"cell {self.cell.name}: robot.model: {model} is not known; known are"
                 f" {', '.join(MODELS)}"
             ) from None
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The cell's bodies: arm, what it carries, what stands around it."""
+        return scene_of(self.cell, self.kinematics)
+
+    @property
+    def clearance_m(self) -> float:
+        """Nearer than this no body may come to another."""
+        return self.cell.clearance_m
 
     @cached_property
     def _carried_m(self) -> FloatArray:
@@ -129,33 +144,51 @@ class Guard:
         return np.asarray(start_rad + share * (end_rad - start_rad))
 
     def check_move(self, start_rad: FloatArray, end_rad: FloatArray, where: str) -> None:
-        """Raise `SafetyError` where the move leaves the workspace or enters a keep-out box."""
-        path = self.path(start_rad, end_rad)
-        self._check_limits(path[-1], where)
-        points = self._points_m(path)
-        space = self.cell.workspace
-        if space is not None and not _inside(points, space).all():
-            x, y, z = points[~_inside(points, space)][0]
-            raise SafetyError(
-                f"{where}: the arm would leave the workspace at x={x:.3f} y={y:.3f} z={z:.3f} m."
-                " Change the view, go there over another one, or correct `workspace`."
-            )
-        for box in self.cell.keep_out:
-            entered = _inside(points, box)
-            if entered.any():
-                x, y, z = points[entered][0]
-                raise SafetyError(
-                    f"{where}: the arm would enter the keep-out box `{box.name}` at"
-                    f" x={x:.3f} y={y:.3f} z={z:.3f} m. Change the view, or go over another one."
-                )
+        """Raise `SafetyError` where a joint limit or a body refuses the straight joint move."""
+        self._check_limits(np.asarray(end_rad, float), where)
+        if self._clear(start_rad, end_rad):
+            return
+        near = self.scene.along(start_rad, end_rad)
+        if near is not None:
+            raise SafetyError(f"{where}: {self._too_near(near)}")
 
-    def _points_m(self, path_rad: FloatArray) -> FloatArray:
-        """(S, P, 3) points of the arm that sweep: elbow to flange, and what it carries."""
-        frames = self.kinematics.frames(path_rad)[..., _MOVING_FRAMES, :, :]
-        flange = frames[..., -1, :, :]
+    def _too_near(self, near: Nearest) -> str:
+        x, y, z = near.place_m
+        when = "where the arm stands" if near.share == 0 else f"{near.share:.0%} of the way there"
+        return (
+            f"{_how(near)} at x={x:.3f} y={y:.3f} z={z:.3f} m, {when};"
+            f" {1e3 * self.clearance_m:.0f} mm must stay free. Change the view, go over another"
+            " one, or correct the cell file (layout, camera.body, carried, workspace, keep_out,"
+            " floor_m, clearance_m)."
+        )
+
+    def _clear(self, start_rad: FloatArray, end_rad: FloatArray) -> bool:
+        for begin in (end_rad, start_rad):  # most moves that are refused are so where they end
+            near = self.scene.along(begin, end_rad, self.clearance_m, self.spare_m)
+            if near is not None and near.distance_m < self.clearance_m:
+                return False
+        return True
+
+    def may_move(self, start_rad: FloatArray, end_rad: FloatArray) -> bool:
+        """Whether `check_move` lets the arm move; the same move is worked out once."""
+        if not self.kinematics.within_limits(end_rad):
+            return False
+        move = start_rad.tobytes() + end_rad.tobytes()
+        if move not in self._answers:
+            self._answers[move] = self._clear(start_rad, end_rad)
+        return self._answers[move]
+
+    def nearest(self, joints_rad: Sequence[FloatArray]) -> Nearest | None:
+        """Where bodies come nearest on a tour through joint angles (N, J); None if nothing can."""
+        found = [self.scene.along(here, there) for here, there in pairwise(joints_rad)]
+        return min((n for n in found if n is not None), key=lambda n: n.distance_m, default=None)
+
+    def _outer_m(self, path_rad: FloatArray) -> FloatArray:
+        """(S, P, 3) flange and what it carries, along a path."""
+        flange = self.kinematics.forward(path_rad)
         carried = self._carried_m @ np.swapaxes(flange[..., :3, :3], -1, -2)
         carried = carried + flange[..., None, :3, 3]
-        return np.asarray(np.concatenate([frames[..., :3, 3], carried], axis=-2))
+        return np.asarray(np.concatenate([flange[..., None, :3, 3], carried], axis=-2))
 
     def move_time_s(self, start_rad: FloatArray, end_rad: FloatArray) -> float:
         """Least time of a move at the plan's speeds, without acceleration."""
@@ -180,8 +213,7 @@ class Guard:
     def _joint_speed_rad_s(self, start_rad: FloatArray, end_rad: FloatArray) -> float:
         """Speed of the fastest joint at which no outer point exceeds the limit on the path."""
         path = self.path(start_rad, end_rad)
-        outer = self._points_m(path)[:, -1 - len(self._carried_m) :]
-        steps = np.diff(outer, axis=0)
+        steps = np.diff(self._outer_m(path), axis=0)
         length_m = float(np.linalg.norm(steps, axis=-1).max(initial=0.0)) * (len(path) - 1)
         span = float(np.abs(end_rad - start_rad).max(initial=0.0))
         if length_m < 1e-9:
@@ -219,13 +251,9 @@ class Guard:
         return tuple(joints)
 
 
-def outline_m(board: Board) -> FloatArray:
-    """(4, 3) corners of the board's printed squares, board frame."""
-    corners = board.corners_m
-    low, high = corners.min(axis=0) - board.square_m, corners.max(axis=0) + board.square_m
-    return np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
-
-
-def _inside(points_m: FloatArray, box: Box) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    inside = (points_m >= np.array(box.low_m)) & (points_m <= np.array(box.high_m))
-    return np.asarray(inside.all(axis=-1))
+def _how(near: Nearest) -> str:
+    if near.second == WORKSPACE:
+        return f"{near.first} would leave the workspace"
+    if near.distance_m <= 0:
+        return f"{near.first} would strike {near.second}"
+    return f"{near.first} would come within {1e3 * near.distance_m:.1f} mm of {near.second}"

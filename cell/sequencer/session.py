@@ -18,6 +18,7 @@ from cell.sequencer.sequencer import Devices, Sequencer
 from cell.sequencer.states import Finish, RunResult
 from cell.sequencer.stop import StopRequest, signals_ask
 from cell.sequencer.watcher import Watcher
+from cell.storage.files.cell_file import SimulatedRobot
 from cell.storage.files.plan_file import Plan
 from cell.storage.recording import FrameRecord, Header, RecordingWriter
 from cell.storage.recording.corners import FILE_NAME as DETECTIONS
@@ -128,6 +129,14 @@ def _elapsed_s(
     return max(0.0, time.time() - float(events[0]["unix_s"]))
 
 
+def recorded_robot(robot: SimulatedRobot) -> dict[str, Any]:
+    """The arm of a cell file in the words of `recording.yaml`."""
+    said: dict[str, Any] = {"model": robot.model, "payload_kg": robot.payload_kg}
+    if robot.urdf is not None:
+        said |= {"urdf": robot.urdf, "base": robot.base, "flange": robot.flange}
+    return said
+
+
 def header_of(plan: Plan, *, simulated: bool, images: bool = True) -> Header:
     """The `recording.yaml` of a plan's recording."""
     cell = plan.cell
@@ -135,7 +144,7 @@ def header_of(plan: Plan, *, simulated: bool, images: bool = True) -> Header:
         {
             "schema": "cell.recording/1",
             "name": f"{plan.file.name}{' (simulated)' if simulated else ''}",
-            "robot": {"model": cell.robot.model, "payload_kg": cell.robot.payload_kg},
+            "robot": recorded_robot(cell.robot),
             "camera": {
                 "model": cell.camera.model,
                 "width": cell.camera.width,

@@ -18,6 +18,7 @@ from cell.sequencer.confirmed_stop import ConfirmedStop, StopWord
 from cell.sequencer.guard import Guard
 from cell.sequencer.reading_watch import ARRIVING_RAD, ReadingWatch
 from cell.sequencer.rest import fastest_rad_s
+from cell.sequencer.same_arm import check_same_arm
 from cell.sequencer.stop import StopRequest
 from cell.storage.files.plan_file import Settle
 from drivers.arm import Arm, ArmState, Motion
@@ -63,10 +64,15 @@ class WatchedArm:
         self._readings = ReadingWatch(self.guard)
 
     def connect(self) -> FloatArray:
-        """Open the link; returns the (6,) joint angles the arm stands at."""
+        """Open the link; returns the (6,) joint angles the arm stands at.
+
+        Raises `SafetyError` where it is not the arm that the guard knows.
+        """
         self.arm.connect()
         self.connected = True
-        return joints_of(self.watch())
+        state = self.watch()
+        check_same_arm(self.guard.kinematics, state)
+        return joints_of(state)
 
     def watch(self) -> ArmState:
         """The arm's state.

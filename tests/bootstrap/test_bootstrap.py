@@ -13,12 +13,12 @@ from cell.errors import InputError
 from cell.sequencer.journal import read_journal
 from cell.sequencer.states import Finish
 from cell.storage.files.cell_file import CellFile, read_cell
-from cell.storage.files.parts import Pose
+from cell.storage.files.parts import Box, Pose
 from cell.storage.files.plan_file import read_plan
 from cell.storage.files.writing import yaml_text
 from cell.storage.recording import read_recording
 from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
-from cell.verbs.bootstrap.near_guard import NearGuard, enlarged
+from cell.verbs.bootstrap.near_guard import NearGuard, carried_doubt_m
 from drivers.errors import SafetyError
 from sim.arm import SimArm
 from tests.bootstrap.trials import Wrong, eye_to_hand, irb140, run_trial, ur3
@@ -125,16 +125,27 @@ def test_a_box_that_the_layout_may_reach_stops_it_before_the_first_move(tmp_path
 
 def test_boxes_grow_by_what_may_be_off() -> None:
     told = LayoutDoubt(mount_m=0.04, mount_rad=0.1)
-    cell = ur3()
-    grown = enlarged(cell, told)
-    assert grown.workspace is not None
-    assert grown.workspace.high_m == pytest.approx((0.56, 0.46, 0.76))
-    assert grown.keep_out[0].low_m == pytest.approx((0.64, -0.54, -0.04))
-    beside = enlarged(eye_to_hand(), told).keep_out[0]
+    assert carried_doubt_m(ur3(), told) == pytest.approx(0.04)
     corner_m = np.hypot(0.16, 0.12)
-    assert 0.85 - beside.low_m[0] == pytest.approx(0.04 + 0.1 * corner_m, abs=1e-3)
+    beside = carried_doubt_m(eye_to_hand(), told)
+    assert beside == pytest.approx(0.04 + 0.1 * corner_m, abs=1e-3)
     with pytest.raises(InputError, match="nothing is left of it"):
-        enlarged(cell, LayoutDoubt(mount_m=0.6))
+        carried_doubt_m(ur3(), LayoutDoubt(mount_m=0.6))
+
+
+def test_what_hangs_on_the_flange_is_held_against_boxes_by_what_it_may_be_off() -> None:
+    start = np.radians([31.0, -77, -128, -10, 63, 17])
+    sure = NearGuard.around(ur3(), start, LayoutDoubt(mount_m=0.0, mount_rad=0.0))
+    camera_m = sure.kinematics.forward(start)[:3, 3]
+    low_m, high_m = (
+        camera_m + np.array([0.1, -0.02, -0.02]),
+        camera_m + np.array([0.14, 0.02, 0.02]),
+    )
+    ahead = Box(name="ahead", low_m=tuple(low_m.tolist()), high_m=tuple(high_m.tolist()))
+    sure.with_box(ahead).check_start()
+    doubtful = NearGuard.around(ur3(), start, LayoutDoubt(mount_m=0.1, mount_rad=0.0))
+    with pytest.raises(SafetyError, match=r"camera \(it may be 0.10 m off\) would strike"):
+        doubtful.with_box(ahead).check_start()
 
 
 def test_a_guard_keeps_near(tmp_path: Path) -> None:

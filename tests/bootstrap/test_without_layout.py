@@ -12,7 +12,7 @@ from cell.sequencer.states import Finish
 from cell.storage.files.cell_file import CellFile
 from cell.storage.files.writing import yaml_text
 from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
-from cell.verbs.bootstrap.near_guard import enlarged
+from cell.verbs.bootstrap.near_guard import carried_doubt_m
 from sim.arm import SimArm
 from tests.bootstrap.trials import eye_to_hand, run_trial, ur3
 
@@ -68,8 +68,8 @@ def test_a_mount_of_the_wrong_kind_is_found_by_the_shifts(tmp_path: Path) -> Non
 
 def test_without_a_layout_whatever_is_at_the_flange_may_point_anywhere() -> None:
     unknown, _ = without_layout(eye_to_hand(), 4.7)
-    grown = enlarged(unknown, LayoutDoubt(reach_m=0.1)).keep_out[0]
-    assert 0.85 - grown.low_m[0] == pytest.approx(0.1 + np.hypot(0.16, 0.12), abs=1e-9)
+    doubt_m = carried_doubt_m(unknown, LayoutDoubt(reach_m=0.1))
+    assert doubt_m == pytest.approx(0.1 + np.hypot(0.16, 0.12), abs=1e-9)
 
 
 def test_what_is_lacking_is_said_before_anything_moves(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ _ENTRIES = _LENGTHS + _TWISTS
 
 
 def _act(values: FloatArray, walk: Walk) -> None:
-    offset = np.zeros((6, 4)) if walk.dh_offset is None else walk.dh_offset
+    offset = np.zeros((6, 5)) if walk.dh_offset is None else walk.dh_offset
     for value, (_, joint, column) in zip(values, _ENTRIES, strict=True):
         offset[joint, column] += value
     walk.dh_offset = offset

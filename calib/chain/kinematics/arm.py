@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -16,8 +17,8 @@ from calib.chain.kinematics.gravity import (
 )
 from calib.views import BoolArray, FloatArray
 
-InverseBranches = Callable[[FloatArray, FloatArray, float], FloatArray]
-"""(dh, base_from_flange, wrist angle to take where it is free) -> (B, 6) raw branches."""
+InverseBranches = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+"""(dh, base_from_flange, joints to take where a singular pose leaves them free) -> (B, 6)."""
 
 _POSE_TOLERANCE = 1e-7
 
@@ -35,7 +36,8 @@ class ArmKinematics:
     name:
         Model name, lower case.
     dh:
-        (6, 4) standard DH rows (theta offset rad, d m, a m, alpha rad); link 6 is the flange.
+        (6, 5) rows (theta offset rad, d m, a m, alpha rad, beta rad), see `dh`; the last link is
+        the flange.
     limits_rad:
         (6, 2) lower and upper joint limits.
     max_speed_rad_s:
@@ -44,6 +46,8 @@ class ArmKinematics:
         The maker's figure for how far the wrist gets from joint 1's axis.
     masses:
         Link masses and centres of mass, for `gravity_torques`.
+    ends:
+        (2, 4, 4) base_from_first and last_from_flange, before and behind the rows.
     """
 
     name: str
@@ -53,6 +57,7 @@ class ArmKinematics:
     reach_m: float
     masses: LinkMasses
     inverse_branches: InverseBranches = field(repr=False)
+    ends: FloatArray = field(default_factory=lambda: np.array([np.eye(4), np.eye(4)]))
 
     def forward(self, joints_rad: FloatArray, dh_offset: FloatArray | None = None) -> FloatArray:
         """Flange poses in the base frame.
@@ -62,18 +67,28 @@ class ArmKinematics:
         joints_rad:
             (..., 6) joint angles, radians.
         dh_offset:
-            (6, 4) or (..., 6, 4) to be added to `dh`: a calibrated or a wrong geometry.
+            (6, 5) or (..., 6, 5) to be added to `dh`: a calibrated or a wrong geometry.
 
         Returns
         -------
         FloatArray
             (..., 4, 4) base_from_flange.
         """
-        return chain.tips(np.asarray(joints_rad, float), self._rows(dh_offset))
+        tips = chain.tips(np.asarray(joints_rad, float), self._rows(dh_offset))
+        return tips if self._bare else np.asarray(self.ends[0] @ tips @ self.ends[1])
 
     def frames(self, joints_rad: FloatArray, dh_offset: FloatArray | None = None) -> FloatArray:
         """Poses (..., 7, 4, 4) in the base of the base frame and the six link frames."""
-        return chain.frames(np.asarray(joints_rad, float), self._rows(dh_offset))
+        frames = chain.frames(np.asarray(joints_rad, float), self._rows(dh_offset))
+        if not self._bare:
+            frames = self.ends[0] @ frames
+            frames[..., -1, :, :] = frames[..., -1, :, :] @ self.ends[1]
+        return frames
+
+    @cached_property
+    def _bare(self) -> bool:
+        """Whether base and flange are the chain's own first and last frame."""
+        return bool((self.ends == np.eye(4)).all())
 
     def jacobian(self, joints_rad: FloatArray, dh_offset: FloatArray | None = None) -> FloatArray:
         """Geometric Jacobian (..., 6, 6) in the base frame.
@@ -117,7 +132,7 @@ class ArmKinematics:
             (B, 6), B from 0 to 8, nearest first.
         """
         near = np.zeros(6) if near_rad is None else np.asarray(near_rad, float)
-        raw = self.inverse_branches(self.dh, base_from_flange, float(near[5]))
+        raw = self.inverse_branches(self.dh, base_from_flange, near)
         branches = self._nearest_turns(raw, near)
         branches = branches[np.isfinite(branches).all(axis=1)]
         misfit = np.abs(self.forward(branches) - base_from_flange).max(axis=(1, 2), initial=0.0)

@@ -13,21 +13,21 @@ _SINGULAR = 1e-9
 
 
 def spherical_wrist_branches(
-    dh: FloatArray, base_from_flange: FloatArray, free_wrist_rad: float
+    dh: FloatArray, base_from_flange: FloatArray, near_rad: FloatArray
 ) -> FloatArray:
     """Up to eight branches (B, 6), whole turns not yet resolved.
 
     For rows of the form alpha = (-90, 0, -90, 90, -90, 0) degrees with lengths d1, a1, a2, a3,
     d4, d6: the wrist's centre gives joints 1 to 3, the turn left over gives a ZYZ wrist
     (Siciliano et al., Robotics, section 2.12.5). Where joints 4 and 6 are in line, joint 6
-    takes `free_wrist_rad`.
+    takes that of `near_rad`.
     """
     centre = base_from_flange[:3, 3] - dh[5, 1] * base_from_flange[:3, 2]
     found = []
     for front, elbow, flip in product((True, False), (1.0, -1.0), (1.0, -1.0)):
         arm = _first_three(dh, centre, front, elbow)
         if arm is not None:
-            found.append([*arm, *_wrist(dh, base_from_flange, arm, flip, free_wrist_rad)])
+            found.append([*arm, *_wrist(dh, base_from_flange, arm, flip, float(near_rad[5]))])
     return np.array(found).reshape(-1, 6)
 
 

@@ -16,13 +16,13 @@ from calib.views import FloatArray
 _SINGULAR = 1e-9
 
 
-def ur_branches(dh: FloatArray, base_from_flange: FloatArray, free_wrist_rad: float) -> FloatArray:
+def ur_branches(dh: FloatArray, base_from_flange: FloatArray, near_rad: FloatArray) -> FloatArray:
     """Up to eight branches (B, 6), whole turns not yet resolved.
 
-    Where joints 2, 3, 4 and 6 are parallel, joint 6 is free and takes `free_wrist_rad`.
+    Where joints 2, 3, 4 and 6 are parallel, joint 6 is free and takes that of `near_rad`.
     """
     found = [
-        _solve(dh, base_from_flange, (shoulder, wrist, elbow), free_wrist_rad)
+        _solve(dh, base_from_flange, (shoulder, wrist, elbow), float(near_rad[5]))
         for shoulder, wrist, elbow in product((1.0, -1.0), repeat=3)
     ]
     return np.array([joints for joints in found if joints is not None]).reshape(-1, 6)

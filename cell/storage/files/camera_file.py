@@ -22,6 +22,25 @@ class Lens(Part):
 Side = Annotated[int, Field(gt=0, le=PICTURE_SIDE)]
 
 
+class CameraBody(Part):
+    """The room that camera, lens and cable take: a box along the optical axis.
+
+    It is placed by where the camera is (`layout.mounted`, or `layout.fixed` for a fixed camera),
+    whose origin is the lens's entrance pupil.
+    """
+
+    width_m: Positive = 0.07
+    """Along the picture's rows."""
+    height_m: Positive = 0.07
+    """Along its columns."""
+    behind_m: Positive = 0.07
+    """From the entrance pupil back to the camera's rear."""
+    ahead_m: Positive = 0.03
+    """From the entrance pupil to the front of the lens, with its light or shade."""
+    cable_m: float = Field(default=0.03, ge=0)
+    """Behind the camera: the plug, and the bend of the cable."""
+
+
 class SimulatedCamera(Part):
     """A camera in this process, and what all cameras have in common."""
 
@@ -32,6 +51,9 @@ class SimulatedCamera(Part):
     pixel_size_um: Positive | None = None
     focus: Literal["auto", "manual", "motorised", "fixed"] | None = None
     lens: Lens | None = None
+    body: CameraBody | None = None
+    """Where it is not given: 7 x 7 cm across, 3 cm ahead of the pupil, and from there back to the
+    flange, at most 10 cm."""
 
     @model_validator(mode="after")
     def _affordable(self) -> Self:

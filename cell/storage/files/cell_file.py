@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from calib.views import FloatArray, Mount
+from cell.storage.files.arm_description import adopt_description
 from cell.storage.files.board_file import Charuco, Chessboard
 from cell.storage.files.camera_file import CameraFile
 from cell.storage.files.parts import Box, Distance, Duration, Finite, Joints, Part, Pose, Positive
@@ -47,9 +48,15 @@ class SimulatedRobot(Part):
     """An arm in this process."""
 
     driver: Literal["sim"]
-    model: str | None
-    """Kinematic model: ur3, ur3e, ur5, ur5e, ur10, ur10e, ur16e, irb140; null where it is unknown,
-    for a cell that is simulated at logged poses and never moved."""
+    model: str | None = None
+    """Kinematic model: ur3, ur3e, ur5, ..., irb140, ...; null where it is unknown, for a cell that
+    is simulated at logged poses and never moved. Not needed with `urdf`."""
+    urdf: Path | None = None
+    """Description of any other six-joint arm; relative to this file."""
+    base: str = "base_link"
+    """Link of `urdf` whose frame poses are told in; `base` for a Universal Robot."""
+    flange: str = "tool0"
+    """Link of `urdf` that is the tool flange."""
     payload_kg: float = Field(default=0.0, ge=0)
     """Mass of camera and bracket at the flange."""
 
@@ -222,13 +229,21 @@ class CellFile(Part):
     mount: Mount = "eye_in_hand"
     layout: Layout | None = None
     workspace: Box | None = None
-    """The arm's links and the camera stay inside this box."""
+    """The arm's links and what it carries stay inside this box."""
     keep_out: tuple[Box, ...] = ()
-    """They stay out of these. A real arm is refused until the key is there, even if empty: `[]`."""
+    """They stay out of these: the board's stand, a cabinet, a post. A real arm
+    is refused until the key is there, even if empty: `[]`."""
     no_workspace_because: str | None = Field(default=None, min_length=10)
     """Why nothing around this arm can be hit: with it, a real arm is moved without `workspace`."""
     joint_limits_deg: JointLimits | None = None
     """Narrower ranges of joints than the maker's: for cables, or a wrist that must not turn far."""
+    floor_m: Finite | None = None
+    """Height of the floor, or of the table, in the robot base; nothing goes below it."""
+    carried: tuple[Box, ...] = ()
+    """What else hangs on the flange, boxes in the flange's frame: bracket, lamp, cable. Where none
+    is given, a rod of 4 cm from the flange to the camera (or the board) stands for the bracket."""
+    clearance_m: float = Field(default=0.01, ge=0)
+    """Nearer than this no body comes to another one; plans are designed with 2 cm more."""
     simulation: Simulation | None = None
 
     @model_serializer(mode="wrap")
@@ -250,4 +265,17 @@ class CellFile(Part):
 
 def read_cell(path: Path) -> CellFile:
     """Read a cell file; raises `InputError` with every error in it."""
-    return read_model(path, CellFile, schema=SCHEMA)
+    return with_arm_known(path, read_model(path, CellFile, schema=SCHEMA))
+
+
+def with_arm_known(path: Path, cell: CellFile) -> CellFile:
+    """The cell with the arm of its `robot.urdf` known by a name; `path` is the file it is in.
+
+    Raises `InputError` where the description cannot be used.
+    """
+    if cell.robot.urdf is None:
+        return cell
+    urdf = (path.parent / cell.robot.urdf).resolve()
+    name = adopt_description(f"{path}: robot.urdf", urdf, cell.robot.base, cell.robot.flange)
+    robot = cell.robot.model_copy(update={"model": name, "urdf": urdf})
+    return cell.model_copy(update={"robot": robot})

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Discriminator, Field, PositiveInt, Tag, model_validator
 
 from cell.errors import InputError
-from cell.storage.files.cell_file import CellFile, read_cell
+from cell.storage.files.cell_file import CellFile, read_cell, with_arm_known
 from cell.storage.files.parts import Distance, Duration, Finite, Joints, Part, Pose, Positive
 from cell.storage.files.yaml_model import check_schema, parse_model, position_of, read_mapping
 from cell.storage.incoming import inside, plain_file
@@ -233,7 +233,7 @@ def read_plan(path: Path) -> Plan:
 
 def _cell_of(path: Path, file: PlanFile) -> CellFile:
     if isinstance(file.cell, CellFile):
-        return file.cell
+        return with_arm_known(path, file.cell)
     cell_path = inside(path.parent, file.cell, f"{path}: cell")
     if not plain_file(cell_path):
         raise InputError(

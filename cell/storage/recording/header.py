@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import copyfile
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, model_validator
 
 from calib.views import Mount
+from cell.storage.files.arm_description import COPY_NAME, adopt_description
 from cell.storage.files.board_file import BoardFile
 from cell.storage.files.camera_file import Side
 from cell.storage.files.writing import yaml_text
 from cell.storage.files.yaml_model import read_model
+from cell.storage.incoming import inside
 from cell.storage.incoming.pictures import check_pixels
 
 SCHEMA: Final = "cell.recording/1"
@@ -33,6 +36,11 @@ class RecordedRobot(_Part):
 
     model: str | None = None
     """Name of its kinematic model (`ur5e`, `irb140`, ...), or null."""
+    urdf: Path | None = None
+    """Description of an arm that has no name here, in the recording's folder."""
+    base: str = "base_link"
+    flange: str = "tool0"
+    """Links of `urdf` that count as base and flange."""
     payload_kg: float | None = Field(default=None, ge=0)
     """Mass at the flange, or null."""
 
@@ -80,10 +88,24 @@ class Header(_Part):
 
 def read_header(folder: Path) -> Header:
     """Read a recording's `recording.yaml`; raises `InputError`."""
-    return read_model(folder / FILE_NAME, Header, schema=SCHEMA)
+    path = folder / FILE_NAME
+    header = read_model(path, Header, schema=SCHEMA)
+    robot = header.robot
+    if robot.urdf is None:
+        return header
+    urdf = inside(folder, str(robot.urdf), f"{path}: robot.urdf")
+    name = adopt_description(f"{path}: robot.urdf", urdf, robot.base, robot.flange)
+    return header.model_copy(update={"robot": robot.model_copy(update={"model": name})})
 
 
 def write_header(folder: Path, header: Header) -> None:
-    """Write a new `recording.yaml`; raises `FileExistsError` rather than overwrite one."""
+    """Write a new `recording.yaml`, and a copy of the arm's description where it has one.
+
+    Raises `FileExistsError` rather than overwrite a header.
+    """
+    if header.robot.urdf is not None:
+        copyfile(header.robot.urdf, folder / COPY_NAME)
+        robot = header.robot.model_copy(update={"urdf": Path(COPY_NAME)})
+        header = header.model_copy(update={"robot": robot})
     with (folder / FILE_NAME).open("x", encoding="utf-8") as file:
         file.write(yaml_text(header.as_mapping()))

@@ -16,7 +16,7 @@ from calib.chain import rigid
 from calib.chain.model import CellModel, predict, walk
 from calib.solver.joint import JointFit
 from calib.views import FloatArray, Views
-from cell.sequencer.guard import outline_m
+from cell.sequencer.bodies import outline_m
 from cell.storage.files.parts import Box
 
 SIGMAS = 3.0

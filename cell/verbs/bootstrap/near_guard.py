@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
+from calib.bodies import Scene
 from calib.chain import rigid
 from calib.views import FloatArray
 from cell.errors import InputError
-from cell.sequencer.guard import Guard, outline_m
+from cell.sequencer.bodies import doubtful_scene_of, outline_m
+from cell.sequencer.guard import Guard
 from cell.storage.files.cell_file import CellFile
 from cell.storage.files.parts import Box
 from cell.verbs.bootstrap.layout_doubt import LayoutDoubt
@@ -33,20 +35,28 @@ class NearGuard(Guard):
     ----------
     start_rad:
         (6,) where it stood.
+    doubt_m:
+        How far what hangs on the flange may be from where the layout has it.
     """
 
     start_rad: FloatArray
+    doubt_m: float
 
     @classmethod
     def around(cls, cell: CellFile, start_rad: FloatArray, told: LayoutDoubt) -> NearGuard:
         """The guard of a cell whose layout is off by no more than is told; raises `InputError`."""
         joint_speed = float(np.radians(JOINT_SPEED_DEG_S))
-        return cls(enlarged(cell, told), SPEED_M_S, joint_speed, start_rad)
+        return cls(cell, SPEED_M_S, joint_speed, start_rad, carried_doubt_m(cell, told))
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The cell's bodies, what hangs on the flange larger by what it may be off."""
+        return doubtful_scene_of(self.cell, self.kinematics, self.doubt_m)
 
     def with_box(self, box: Box) -> NearGuard:
         """The same guard, kept out of one box more."""
         cell = self.cell.model_copy(update={"keep_out": (*self.cell.keep_out, box)})
-        return NearGuard(cell, self.speed_m_s, self.joint_speed_rad_s, self.start_rad)
+        return replace(self, cell=cell)
 
     def check_surroundings(self) -> None:
         """Raise `SafetyError` where the arm stands too near to a box to be moved at all."""
@@ -55,8 +65,8 @@ class NearGuard(Guard):
             self.check_move(self.start_rad, self.start_rad, "where the arm stands")
         except SafetyError as refusal:
             raise SafetyError(
-                f"{refusal} The boxes are taken larger by what the layout may be off; drive the"
-                " arm away from them by hand, or tell a better known layout."
+                f"{refusal} What hangs on the flange is taken larger by what the layout may be"
+                " off; drive the arm away by hand, or tell a better known layout."
             ) from None
 
     def check_move(self, start_rad: FloatArray, end_rad: FloatArray, where: str) -> None:
@@ -77,30 +87,23 @@ class NearGuard(Guard):
             )
 
 
-def enlarged(cell: CellFile, told: LayoutDoubt) -> CellFile:
-    """The cell with its boxes moved in by as much as the carried thing may be off.
+def carried_doubt_m(cell: CellFile, told: LayoutDoubt) -> float:
+    """How far any point of what hangs on the flange may be from where the layout has it.
 
     Raises
     ------
     InputError
-        Nothing is left of the workspace.
+        The workspace is too small for that.
     """
     carried = outline_m(cell.board.board()) if cell.mount == "eye_to_hand" else np.zeros((1, 3))
     reach_m = float(np.linalg.norm(carried, axis=1).max())
-    margin_m = told.mount_m + reach_m * 2.0 * float(np.sin(0.5 * told.mount_rad))
+    doubt_m = told.mount_m + reach_m * 2.0 * float(np.sin(0.5 * told.mount_rad))
     if cell.layout is None:  # what is at the flange may point anywhere
-        margin_m = told.reach_m + reach_m
-    try:
-        space = None if cell.workspace is None else _grown(cell.workspace, -margin_m)
-    except ValidationError:
+        doubt_m = told.reach_m + reach_m
+    space = cell.workspace
+    if space is not None and min(np.subtract(space.high_m, space.low_m)) <= 2 * doubt_m:
         raise InputError(
-            f"cell {cell.name}: workspace: nothing is left of it when it is made"
-            f" {1e3 * margin_m:.0f} mm smaller all round, as the layout's uncertainty demands"
-        ) from None
-    keep_out = tuple(_grown(box, margin_m) for box in cell.keep_out)
-    return cell.model_copy(update={"workspace": space, "keep_out": keep_out})
-
-
-def _grown(box: Box, by_m: float) -> Box:
-    low, high = np.array(box.low_m) - by_m, np.array(box.high_m) + by_m
-    return Box(name=box.name, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()))
+            f"cell {cell.name}: workspace: nothing is left of it for what is on the flange, which"
+            f" may be {1e3 * doubt_m:.0f} mm off on every side"
+        )
+    return doubt_m

@@ -27,7 +27,7 @@ from cell.storage.recording import Recording
 from cell.verbs.diagnose.twin import twin_cell
 from cell.verbs.plan.candidates import parallel, varied
 from cell.verbs.plan.planner import view_of
-from cell.verbs.plan.reach import Candidate, free, layout_of, reachable
+from cell.verbs.plan.reach import Candidate, layout_of, reachable
 
 POSES = 8
 _TWICE = 2.0
@@ -134,11 +134,11 @@ def _in_order(stops: list[Candidate], home: Candidate, guard: Guard) -> list[Can
     left, here, way = list(stops), home, list[Candidate]()
     while left:
         left.sort(key=lambda stop: float(np.abs(stop.joints_rad - here.joints_rad).max()))
-        near = [s for s in left if free(guard, here.joints_rad, s.joints_rad)]
+        near = [s for s in left if guard.may_move(here.joints_rad, s.joints_rad)]
         here = near[0] if near else home
         way.append(here)
         left = [s for s in left if s is not here]
-    if not free(guard, here.joints_rad, way[0].joints_rad):
+    if not guard.may_move(here.joints_rad, way[0].joints_rad):
         way.append(home)
     return way
 

@@ -43,6 +43,10 @@ def twin_cell(found: Diagnosis, recording: Recording) -> dict[str, Any]:
     camera = header["camera"]
     views, model, noise = found.views, found.twin.model, found.twin.noise
     robot = {"driver": "sim", "model": views.robot_model, "payload_kg": views.payload_kg or 0.0}
+    known = recording.header.robot
+    if known.urdf is not None:
+        urdf = str((recording.path / known.urdf).resolve())
+        robot |= {"urdf": urdf, "base": known.base, "flange": known.flange}
     return {
         "schema": CELL_SCHEMA,
         "name": f"{recording.name}-twin",

@@ -6,11 +6,14 @@ import time
 
 import numpy as np
 
+from calib.chain.kinematics import MODELS, ArmKinematics, arm
+from cell.sequencer.same_arm import flange_difference, model_differs
 from cell.storage.files.cell_file import UniversalRobot
 from cell.verbs.doctor.finding import Finding
 from cell.verbs.doctor.ports import CHECK_LINE, port
 from drivers.errors import DeviceError
 from drivers.ur.panel import Panel
+from drivers.ur.pose import base_from_flange
 from drivers.ur.reader import Packet, RtdeReader
 from drivers.ur.which_panel import panel_of
 
@@ -26,7 +29,7 @@ def universal_robot(robot: UniversalRobot) -> list[Finding]:
     ports = [port(f"UR {name}", robot.address, number) for number, name in _PORTS.items()]
     _, rtde = ports
     findings = [*_panel(robot), *ports]
-    return findings + (_packets(robot.address) if rtde.ready else [])
+    return findings + (_packets(robot) if rtde.ready else [])
 
 
 def _panel(robot: UniversalRobot) -> list[Finding]:
@@ -41,11 +44,20 @@ def _panel(robot: UniversalRobot) -> list[Finding]:
             kind = f"PolyScope X, robot API {told['robot_api']}"
         found = ", ".join(told[key] for key in ("polyscope", "model", "serial") if key in told)
         answers = Finding("UR controller", True, f"{kind}: {found or 'tells no version'}")
-        return [answers, *_state(panel)]
+        return [answers, _model(robot.model or "", told.get("model", "")), *_state(panel)]
     except DeviceError as silent:
         return [Finding("UR controller", False, str(silent), CHECK_LINE)]
     finally:
         panel.close()
+
+
+def _model(named: str, model: str) -> Finding:
+    return Finding(
+        "UR model",
+        not model_differs(named, model),
+        f"{model or 'not told'}; the cell file says {named or 'nothing'}",
+        "write the model that is connected at robot.model, and plan anew",
+    )
 
 
 def _state(panel: Panel) -> list[Finding]:
@@ -73,8 +85,8 @@ def _state(panel: Panel) -> list[Finding]:
     ]
 
 
-def _packets(address: str) -> list[Finding]:
-    reader = RtdeReader(address, silence_s=_SILENCE_S)
+def _packets(robot: UniversalRobot) -> list[Finding]:
+    reader = RtdeReader(robot.address, silence_s=_SILENCE_S)
     try:
         reader.connect()
         heard = _listen(reader)
@@ -82,7 +94,20 @@ def _packets(address: str) -> list[Finding]:
         return [Finding("UR state", False, str(fault), CHECK_LINE)]
     finally:
         reader.close()
-    return [_tool(heard[-1]), _clock(heard)]
+    same = [] if robot.model not in MODELS else [_same_arm(arm(robot.model), heard[-1])]
+    return [*same, _tool(heard[-1]), _clock(heard)]
+
+
+def _same_arm(named: ArmKinematics, packet: Packet) -> Finding:
+    reported = base_from_flange(packet.vector("actual_TCP_pose"), packet.vector("tcp_offset"))
+    found = flange_difference(named, np.array(packet.vector("actual_q")), reported)
+    return Finding(
+        "UR kinematics",
+        found.same,
+        f"the reported flange is {found} from where the drawing of a {named.name} has it",
+        "a factory calibration makes a few millimetres; this is another model: write it at"
+        " robot.model, and plan anew",
+    )
 
 
 def _listen(reader: RtdeReader) -> list[Packet]:

@@ -13,14 +13,15 @@ from cell.errors import InputError
 from cell.sequencer.guard import Guard
 from cell.storage.files.cell_file import CellFile, Layout
 from cell.verbs.plan.size import FEWEST_FRAMES
-from drivers.errors import SafetyError
 
 _FROM_HOME_RAD = np.radians([110.0, 110.0, 110.0, 110.0, 110.0, 200.0])
-"""Joints stay this near to home: an arm that folds over or flips its wrist may hit itself, which
-the guard does not know."""
+"""Joints stay this near to home: an arm that folds over or flips its wrist goes a long way."""
 
 _SPEED_M_S, _JOINT_SPEED_RAD_S = 0.1, float(np.radians(30.0))
 """Those of a plan file that does not tell its own."""
+
+_SPARE_M = 0.02
+"""Plans keep so much more than the cell's clearance: a layout is known to a centimetre or two."""
 
 _WRIST = 4
 """Frame whose origin follows joints 1 to 3 alone, in elbow arms with either kind of wrist."""
@@ -54,8 +55,8 @@ def layout_of(cell: CellFile) -> Layout:
 
 
 def planning_guard(cell: CellFile) -> Guard:
-    """The cell's guard, at the speeds of a plan that tells none."""
-    return Guard(cell, _SPEED_M_S, _JOINT_SPEED_RAD_S)
+    """The cell's guard, at the speeds of a plan that tells none, with room to spare."""
+    return Guard(cell, _SPEED_M_S, _JOINT_SPEED_RAD_S, spare_m=_SPARE_M)
 
 
 def require_enough(reached: Sequence[Candidate], cell: CellFile) -> None:
@@ -83,7 +84,7 @@ def reachable(
         middle = camera_from_board.inv() if cell.mount == "eye_in_hand" else camera_from_board
         pose = (fixed * middle * mounted.inv()).as_matrix()
         for joints in _usual_branches(pose, home, guard):
-            if free(guard, home, joints):
+            if guard.may_move(home, joints):
                 depth = float(camera_from_board.apply(centre)[2])
                 yield Candidate(station, depth, pose, joints)
                 break
@@ -103,12 +104,3 @@ def _posture(guard: Guard, joints_rad: FloatArray) -> FloatArray:
     axes = frames[..., :3, :3, 2]
     arms = frames[..., _WRIST : _WRIST + 1, :3, 3] - frames[..., :3, :3, 3]
     return np.asarray(np.sign(np.linalg.det(np.cross(axes, arms))))
-
-
-def free(guard: Guard, here: FloatArray, there: FloatArray) -> bool:
-    """Whether the guard lets the arm move straight from one to the other."""
-    try:
-        guard.check_move(here, there, "")
-    except SafetyError:
-        return False
-    return True

@@ -13,7 +13,7 @@ import numpy as np
 
 from calib.views import FloatArray
 from cell.sequencer.guard import Guard
-from cell.verbs.plan.reach import Candidate, free
+from cell.verbs.plan.reach import Candidate
 
 _MOST_TURN_RAD = np.radians([120.0, 120.0, 120.0, 120.0, 120.0, 360.0])
 """Between two neighbours; what turns more is an arm or a wrist that flips over."""
@@ -55,7 +55,7 @@ def _seconds(joints: FloatArray, guard: Guard) -> FloatArray:
     for a in range(n):
         for b in range(a):
             allowed = bool((np.abs(joints[a] - joints[b]) <= _MOST_TURN_RAD).all())
-            allowed = allowed and free(guard, joints[a], joints[b])
+            allowed = allowed and guard.may_move(joints[a], joints[b])
             told = guard.move_time_s(joints[a], joints[b]) if allowed else _NEVER_S
             seconds[a, b] = seconds[b, a] = told
     return seconds

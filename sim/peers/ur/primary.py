@@ -67,7 +67,7 @@ class PrimaryServer:
         mode = _package(_ROBOT_MODE, bytes(41))
         if self._controller.kinematics is None:
             return mode
-        theta, d, a, alpha = self._controller.kinematics.dh.T
+        theta, d, a, alpha = self._controller.kinematics.dh[:, :4].T
         body = struct.pack(">6I24dI", *range(6), *theta, *a, *d, *alpha, _LINEARISED)
         return mode + _package(_KINEMATICS, body)
 

@@ -61,7 +61,7 @@ def _(p: Numbers, scene: Scene) -> None:
 @_of("joint_zero_offset")
 def _(p: Numbers, scene: Scene) -> None:
     theta = anp.reshape(_each_joint(p, "offset_rad"), (6, 1))
-    scene.dh = scene.dh + theta * np.array([[1.0, 0.0, 0.0, 0.0]])
+    scene.dh = scene.dh + theta * np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])
 
 
 @_of("joint_backlash")
@@ -120,7 +120,7 @@ def _(p: Numbers, scene: Scene) -> None:
     for name, value in p.items():
         column = {"d": 1, "a": 2, "t": 3}[name[0]]
         joint = next(int(letter) for letter in name if letter.isdigit())
-        scene.dh = scene.dh + value * np.outer(np.eye(6)[joint - 1], np.eye(4)[column])
+        scene.dh = scene.dh + value * np.outer(np.eye(6)[joint - 1], np.eye(5)[column])
 
 
 @_of("mount_flex")
