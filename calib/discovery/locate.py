@@ -75,12 +75,16 @@ class Cell:
         return min(1.0, self.score.p_value * self.tried)
 
 
-def locate(fit: JointFit, views: Views) -> list[Cell]:
-    """Test every site against every covariate; the most significant first."""
+def locate(fit: JointFit, views: Views, *, periods: bool = True) -> list[Cell]:
+    """Test every site against every covariate; the most significant first.
+
+    Without `periods` in time where a law that swings was looked for already.
+    """
     state = walk(fit.model, views, **walked(fit.own_error))
     probe = _Probe(fit, views, state)
     cells = [cell for covariate in COVARIATES for cell in probe.along(covariate)]
-    cells += probe.periods()
+    if periods:
+        cells += probe.periods()
     cells += [
         Cell(f.site, f.link, f.covariate, f.score, 1, None, f.where)
         for f in field_scores(fit, views)

@@ -81,7 +81,7 @@ def _carried(search: Search) -> list[Cell]:
         if law is not None:
             found.append(law)
             continue
-        told = alarms(locate(search.best.fit, views))
+        told = alarms(locate(search.best.fit, views, periods=False))
         cell = next((c for c in told if not is_shape_of_law(c, search)), None)
         if cell is None or cell.score.gain < _REMAINDER * known:
             break
