@@ -70,7 +70,7 @@ def test_local_mode_is_refused_with_where_to_switch():
 def test_a_stop_reaches_the_arm_over_the_robot_api_alone():
     def measure():
         with moving() as (arm, controller, sim):
-            arm._supervisor._stops._by_script = lambda: None
+            arm._supervisor._stops._by_script = lambda port: None
             since_s = time.monotonic()
             arm.stop()
             latency_s = halted_s(controller, since_s)
