@@ -11,8 +11,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from cell.errors import EXIT_DEVICE, EXIT_INPUT, DiskFailed, InputError
+from cell.storage.incoming import read_picture
 from cell.storage.recording import (
     Corners,
     FrameRecord,
@@ -137,6 +139,26 @@ def test_size_comes_from_a_picture_where_the_header_does_not_tell(recording_fold
     folder = recording_folder(header=header, frames=frame_line(0, image="a.png"))
     cv2.imwrite(str(folder / "a.png"), np.zeros((30, 40), np.uint8))
     assert read_recording(folder).size_px == (40, 30)
+
+
+def test_a_picture_is_decoded_once_for_corners_and_report(
+    recording_folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = recording_folder(frames=frame_line(0, image="a.png"))
+    cv2.imwrite(str(folder / "a.png"), np.arange(600_000, dtype=np.uint16).reshape(600, 1000))
+    read: list[Path] = []
+
+    def counted(path: Path) -> NDArray[np.generic]:
+        read.append(path)
+        return read_picture(path)
+
+    monkeypatch.setattr("cell.storage.recording.recording.read_picture", counted)
+    recording = read_recording(folder)
+    frame = recording.frames[0]
+    assert recording.image(frame).shape == (600, 1000)
+    small = recording.thumbnail(frame)
+    assert (small.shape, small.dtype) == ((132, 220), np.uint16)
+    assert len(read) == 1
 
 
 def test_corners_survive_writing_and_reading(recording_folder: Folder, tmp_path: Path) -> None:

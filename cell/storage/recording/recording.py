@@ -22,6 +22,7 @@ from cell.storage.recording.frame_log import VECTORS, read_frames
 from cell.storage.recording.frames import FrameRecord
 from cell.storage.recording.further import further_numbers, further_words
 from cell.storage.recording.header import Header, read_header
+from cell.storage.recording.thumbnail import KEPT, shrunk
 
 log = logging.getLogger(__name__)
 
@@ -77,7 +78,20 @@ class Recording:
         InputError
             The frame has no picture, the file is missing, or it is not an image.
         """
-        return read_picture(self.picture(frame))
+        picture = read_picture(self.picture(frame))
+        if len(self._shrunk) < KEPT:
+            self._shrunk[frame.frame] = shrunk(picture)
+        return picture
+
+    @cached_property
+    def _shrunk(self) -> dict[int, NDArray[np.generic]]:
+        """Pictures that were read already, small: a report shows them without reading them anew."""
+        return {}
+
+    def thumbnail(self, frame: FrameRecord) -> NDArray[np.generic]:
+        """The picture of a frame, small; raises as `image` does."""
+        known = self._shrunk.get(frame.frame)
+        return shrunk(self.image(frame)) if known is None else known
 
     def picture(self, frame: FrameRecord) -> Path:
         """File of a frame's picture; raises `InputError` where it has none or leads elsewhere."""

@@ -47,7 +47,7 @@ def _thumbnail(recording: Recording) -> Thumbnail:
 
     def picture(number: int) -> Image | None:
         try:
-            return _eight_bit(recording.image(frames[number]))
+            return _eight_bit(recording.thumbnail(frames[number]))
         except (InputError, KeyError):
             # its reason stands beside the frame; here it is only a picture that is not there
             return None
