@@ -55,7 +55,7 @@ class Address:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             server.bind((self.host, self.port))
-            server.listen(64)
+            server.listen(512)
         except OSError as fault:
             server.close()
             raise InputError(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import socket
 import threading
 import time
 from types import TracebackType
@@ -12,6 +14,7 @@ import uvicorn
 from cell.errors import InputError
 from cell.views.page.address import Address
 from cell.views.page.application import Page
+from cell.views.page.connections import Door, GuardedProtocol
 from cell.views.page.live_run import LiveRun
 
 log = logging.getLogger(__name__)
@@ -20,6 +23,30 @@ _START_S = 10.0
 _FAREWELL_S = 1.5
 _END_S = 3.0
 _POLL_S = 0.02
+_KEEP_ALIVE_S = 60
+"""A tablet's Stop goes through the connection that it has, past whoever else wants in."""
+_HEADER_BYTES = 16_384
+
+
+class _Server(uvicorn.Server):
+    """Serves who is let in at the door."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Open the door in the place of uvicorn's own listening."""
+        await super().startup(sockets=[])
+        (listener,) = list(sockets or [])
+        door = Door(listener, self.server_state.connections, self._protocol)
+        self._door = asyncio.ensure_future(door.run())
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Close the door first."""
+        self._door.cancel()
+        await super().shutdown(sockets=sockets)
+
+    def _protocol(self) -> GuardedProtocol:
+        return GuardedProtocol(
+            config=self.config, server_state=self.server_state, app_state=self.lifespan.state
+        )
 
 
 class LivePage:
@@ -34,18 +61,21 @@ class LivePage:
     def __init__(self, live: LiveRun, address: Address) -> None:
         self._address = address
         self._page = Page(live, address)
+        # who comes in is decided at the door; uvicorn serves who is in
         config = uvicorn.Config(
             self._page.application(),
             log_level="critical",
             access_log=False,
             lifespan="off",
             loop="asyncio",
-            http="h11",
+            http=GuardedProtocol,
+            timeout_keep_alive=_KEEP_ALIVE_S,
+            h11_max_incomplete_event_size=_HEADER_BYTES,
             ws="none",
             server_header=False,
             timeout_graceful_shutdown=1,
         )
-        self._server = uvicorn.Server(config)
+        self._server = _Server(config)
         self._thread = threading.Thread(target=self._serve, name="page", daemon=True)
 
     def __enter__(self) -> str:
