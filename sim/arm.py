@@ -15,6 +15,7 @@ from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable, SafetyE
 from drivers.targets import check_target
 from sim.clock import Clock
 from sim.motion import Move, plan_move, standing
+from sim.noise import PlacedNoise
 
 ACCELERATION_RAD_S2 = 1.4
 """Universal Robots' default for `movej`."""
@@ -84,7 +85,7 @@ class SimArm:
         Which arm, and the time it lives in.
     home_rad:
         (6,) joint angles it stands at first.
-    repeatability, rng:
+    repeatability, noise:
         How it scatters, and by which random numbers.
     """
 
@@ -97,14 +98,14 @@ class SimArm:
         home_rad: FloatArray,
         *,
         repeatability: Repeatability | None = None,
-        rng: np.random.Generator | None = None,
+        noise: PlacedNoise | None = None,
     ) -> None:
         self.faults = ArmFaults()
         self.moves_made = 0
         self._kinematics = kinematics
         self._clock = clock
         self._repeatability = repeatability or Repeatability()
-        self._rng = rng or np.random.default_rng(0)
+        self._noise = noise or PlacedNoise(0, 0)
         self._lock = threading.RLock()
         self._connected = False
         self._fault: str | None = None
@@ -157,7 +158,7 @@ class SimArm:
                 raise DeviceRefused("simulated arm: it is still moving; stop it or wait")
             start = self._move.joints(now)
             self._move = self._planned(target, start, now)
-            self._flange_error = self._repeatability.draw(self._rng)
+            self._flange_error = self._scatter(start, start + self._move.travel_rad)
             self.moves_made += 1
             if self.faults.protective_stop_at_move == self.moves_made:
                 self._fault_due_s = now + 0.5 * self._move.profile.duration_s
@@ -201,7 +202,17 @@ class SimArm:
         with self._lock:
             self._fault = None
 
+    def has_moved(self, came_from_rad: FloatArray, joints_rad: FloatArray) -> FloatArray:
+        """Stand where an interrupted run's move ended; returns the (6,) flange's error there."""
+        with self._lock:
+            self._move = standing(np.asarray(joints_rad, float))
+            self._flange_error = self._scatter(came_from_rad, joints_rad)
+            return self._flange_error
+
     # -- inside ------------------------------------------------------------------------------
+
+    def _scatter(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        return self._repeatability.draw(self._noise.at(start, end))
 
     def _planned(self, target: MoveTarget, start: FloatArray, now: float) -> Move:
         check_target(

@@ -17,6 +17,6 @@ def build(
         clock,
         cell.home_rad,
         repeatability=cell.repeatability,
-        rng=cell.random(ARM_STREAM),
+        noise=cell.placed_noise(ARM_STREAM),
     )
     return arm, SimCamera(cell, arm, clock, render_ahead=render_ahead)

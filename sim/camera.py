@@ -74,7 +74,7 @@ class SimCamera:
         self._cell, self._arm, self._clock = cell, arm, clock
         self._render_ahead = render_ahead
         self._rendered: tuple[bytes, Image] | None = None
-        self._rng = cell.random(SENSOR_STREAM)
+        self._noise = cell.placed_noise(SENSOR_STREAM)
         self._connected_s: float | None = None
         self._exposure_s = 0.8 * cell.camera.sensor.white_exposure_s
         self._gain_db = 0.0
@@ -142,6 +142,25 @@ class SimCamera:
     def close(self) -> None:
         """Let go."""
         self._connected_s = None
+
+    def has_seen(
+        self, row: Row, flange_error: FloatArray, connected_s: float, focus_m: float | None
+    ) -> None:
+        """Take in a frame of an interrupted run, before connecting to go on with it.
+
+        Parameters
+        ----------
+        row, flange_error:
+            As the frame was taken; its time counts from `connected_s`.
+        connected_s:
+            When the interrupted run connected, on the clock.
+        focus_m:
+            Where the lens stood focused, or None where nothing tells.
+        """
+        self._connected_s = connected_s
+        self._focus_distance_m = self._focus_distance_m if focus_m is None else focus_m
+        self._seen.append((row, flange_error))
+        self._noise.at(row.joints_rad)
 
     # -- inside ------------------------------------------------------------------------------
 
@@ -220,7 +239,7 @@ class SimCamera:
             self._cell.camera.sensor,
             exposure_s=self._exposure_s,
             gain_db=self._gain_db,
-            rng=self._rng,
+            rng=self._noise.at(self._seen[-1][0].joints_rad),
         )
         since_connect_s = middle_s - (self._connected_s or 0.0)
         return Frame(

@@ -11,6 +11,7 @@ from calib.chain.kinematics import ArmKinematics, arm
 from calib.chain.model import CellModel
 from calib.views import Board, FloatArray, Mount
 from sim.arm import Repeatability
+from sim.noise import PlacedNoise
 from sim.render import Sensor
 
 Focus = Literal["auto", "manual", "motorised", "fixed"]
@@ -101,6 +102,10 @@ class SimulatedCell:
     def random(self, stream: int) -> np.random.Generator:
         """A generator of its own for each source of noise, so that one does not shift another."""
         return np.random.default_rng([self.seed, stream])
+
+    def placed_noise(self, stream: int) -> PlacedNoise:
+        """As `random`, for a source whose numbers do not depend on the order of what is done."""
+        return PlacedNoise(self.seed, stream)
 
 
 ARM_STREAM, SENSOR_STREAM, CORNER_STREAM = range(3)

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 
 from cell.devices.genicam_options import genicam_options
+from cell.devices.interrupted_run import remember_run
 from cell.errors import InputError
 from cell.sequencer.bounded import check_bounded
 from cell.sequencer.sequencer import Devices
@@ -32,7 +34,7 @@ def simulated_devices(plan: Plan, *, seed: int | None = None) -> Devices:
 
     clock = SimClock()
     arm, camera = build(_true_cell(plan, seed), clock)
-    return Devices(arm, camera, clock)
+    return Devices(arm, camera, clock, partial(remember_run, arm, camera, clock))
 
 
 @contextmanager

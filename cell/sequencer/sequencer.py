@@ -8,12 +8,14 @@ is stopped before anything else happens.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
+
+import numpy as np
 
 from calib.views import FloatArray
 from cell.errors import BadAnswer, DiskFailed, exit_status_of
@@ -24,6 +26,7 @@ from cell.sequencer.guard import Guard
 from cell.sequencer.guide import Guide
 from cell.sequencer.journal import Journal
 from cell.sequencer.progress import Progress, TimeLeft
+from cell.sequencer.reading_watch import ARRIVING_RAD
 from cell.sequencer.requests import SKIPPED_BY_OPERATOR, Requests
 from cell.sequencer.shot import Shot
 from cell.sequencer.states import RunResult, State, Status, finish_of
@@ -33,7 +36,7 @@ from cell.sequencer.watched_camera import CameraLost, asked_of_camera
 from cell.sequencer.watcher import Checked, Watcher, Watchers
 from cell.sequencer.worker import Worker
 from cell.storage.files.plan_file import Plan
-from cell.storage.recording import RecordingWriter
+from cell.storage.recording import FrameRecord, RecordingWriter
 from drivers.arm import Arm, ArmState
 from drivers.camera import Camera, FocusSetting, Frame
 from drivers.errors import FrameLost
@@ -43,11 +46,16 @@ _LAST_FRAME_S = 30.0
 
 @dataclass(frozen=True)
 class Devices:
-    """The arm, the camera, and the clock their `host_t_s` counts on."""
+    """The arm, the camera, and the clock their `host_t_s` counts on.
+
+    `remember` takes the frames that an interrupted run has recorded: simulated devices go on from
+    there as if nothing had happened; real ones have no need of it.
+    """
 
     arm: Arm
     camera: Camera
     clock: Clock = field(default_factory=HostClock)
+    remember: Callable[[Sequence[FrameRecord]], None] | None = None
 
 
 class Sequencer:
@@ -232,8 +240,13 @@ class Sequencer:
     def _come_from_the_view_before(self) -> None:
         """A resumed run comes to its first view from where an unbroken one would have."""
         first = self._progress.todo[0] if self._progress.todo else 0
-        if self._progress.done and first > 0:
+        if self._progress.done and first > 0 and not self._stands_at(first - 1):
             self._go(first - 1)
+
+    def _stands_at(self, index: int) -> bool:
+        here = joints_of(self._arm.watch())
+        there = self._arm.guard.joints_of(self._plan, index, here)
+        return float(np.abs(here - there).max()) < ARRIVING_RAD
 
     def _go(self, index: int) -> FloatArray:
         """Move to a view and settle there; returns the (6,) joint angles the move came from."""

@@ -57,7 +57,7 @@ def record_plan(
     """
     stop = StopRequest() if stop is None else stop
     begin = _resume if resume else _begin
-    writer, journal, progress, elapsed_s = begin(plan, folder, simulated)
+    writer, journal, progress, elapsed_s = begin(plan, folder, simulated, devices)
     with writer, signals_ask(stop):
         sequencer = Sequencer(
             plan,
@@ -85,7 +85,7 @@ def record_plan(
 Begun = tuple[RecordingWriter, Journal, Progress, float]
 
 
-def _begin(plan: Plan, folder: Path, simulated: bool) -> Begun:
+def _begin(plan: Plan, folder: Path, simulated: bool, devices: Devices) -> Begun:
     writer = RecordingWriter.create(folder, header_of(plan, simulated=simulated))
     journal = Journal(folder)
     journal.write(
@@ -100,7 +100,7 @@ def _begin(plan: Plan, folder: Path, simulated: bool) -> Begun:
     return writer, journal, Progress(deque(range(len(plan.file.views)))), 0.0
 
 
-def _resume(plan: Plan, folder: Path, simulated: bool) -> Begun:
+def _resume(plan: Plan, folder: Path, simulated: bool, devices: Devices) -> Begun:
     events = check_same_plan(folder, plan, simulated=simulated)
     journal = Journal(folder)
     writer, frames = RecordingWriter.resume(folder)
@@ -109,8 +109,11 @@ def _resume(plan: Plan, folder: Path, simulated: bool) -> Begun:
     _set_detections_aside(folder)
     todo = [i for i in range(len(plan.file.views)) if i not in done and i not in skipped]
     journal.write("resume", done=len(done), skipped=len(skipped), todo=len(todo))
-    elapsed_s = _elapsed_s(events, frames, simulated)
-    return writer, journal, Progress(deque(todo), done, skipped), elapsed_s
+    began = Progress(deque(todo), done, skipped)
+    if devices.remember is not None and frames:
+        devices.remember(frames)
+        return writer, journal, began, devices.clock.now()
+    return writer, journal, began, _elapsed_s(events, frames, simulated)
 
 
 def _set_detections_aside(folder: Path) -> None:

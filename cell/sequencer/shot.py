@@ -88,6 +88,7 @@ class Shot:
             "frame_device_s": self.frame.device_t_s,
             "pose_host_s": state.host_t_s,
             "pose_controller_s": state.controller_t_s,
+            "read_until_host_s": self.states[-1].host_t_s,
         }
         values["arm_raw"] = _plain(state.raw)
         values["camera_raw"] = _plain(self.frame.raw)

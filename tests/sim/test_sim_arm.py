@@ -11,6 +11,7 @@ from drivers.arm import Motion, MoveTarget
 from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable, SafetyError, StopFailed
 from sim.arm import ACCELERATION_RAD_S2, Repeatability, SimArm
 from sim.clock import SimClock, WallClock
+from sim.noise import PlacedNoise
 
 HOME = np.array([0.2, -1.3, 1.4, -1.2, -1.3, 0.3])
 
@@ -167,7 +168,7 @@ def test_without_connecting_nothing_answers():
 
 def test_it_scatters_anew_with_every_move_as_much_as_asked():
     scatter = Repeatability(position_m=3e-5, rotation_rad=2e-5)
-    robot, clock = ready(repeatability=scatter, rng=np.random.default_rng(5))
+    robot, clock = ready(repeatability=scatter, noise=PlacedNoise(5, 0))
     errors = []
     for k in range(300):
         robot.start_move(MoveTarget(joints_rad=tuple(HOME + 0.01 * (k % 2 + 1))))
