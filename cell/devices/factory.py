@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 
+from calib.chain.kinematics import UnknownArm, arm
 from cell.devices.genicam_options import genicam_options
 from cell.devices.interrupted_run import remember_run
 from cell.errors import InputError
@@ -75,7 +76,12 @@ def _true_cell(plan: Plan, seed: int | None) -> SimulatedCell:
             f"cell {plan.cell.name}: {', '.join(mixups)} is a mix-up in the log, and this log is"
             " true; `cell simulate` without --images can make it"
         )
-    return simulated_cell(plan.cell, home_of(plan), seed=seed)
+    truth_of_cell = simulated_cell(plan.cell, home_of(plan), seed=seed)
+    try:
+        arm(truth_of_cell.robot_model)
+    except UnknownArm as unknown:
+        raise InputError(f"cell {plan.cell.name}: robot.model: {unknown}") from None
+    return truth_of_cell
 
 
 def _require_aravis() -> None:

@@ -336,3 +336,16 @@ def test_an_error_that_nobody_foresaw_is_one_line_and_a_file(tmp_path: Path) -> 
     assert str(kept) in said
     assert "Traceback" in kept.read_text()
     assert len(said.splitlines()) == 1
+
+
+def test_an_arm_that_nobody_knows(tmp_path: Path) -> None:
+    from cell.devices.factory import simulated_devices
+    from cell.storage.files.plan_file import read_plan as read
+
+    configs = Path(__file__).parents[2] / "configs"
+    cell = (configs / "ur3-robotiq.cell.yaml").read_text().replace("model: ur3,", "model: kr10,")
+    assert "kr10" in cell
+    (tmp_path / "ur3-robotiq.cell.yaml").write_text(cell)
+    (tmp_path / "p.yaml").write_text((configs / "ur3-robotiq.plan.yaml").read_text())
+    with pytest.raises(InputError, match=r"robot.model: .*kr10.* use one of ur3"):
+        simulated_devices(read(tmp_path / "p.yaml"))
