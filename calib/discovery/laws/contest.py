@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from calib.chain.laws.law import present_law
+from calib.chain.effect import Effect
+from calib.chain.effects import catalogue
+from calib.chain.laws.law import Law, present_law
 from calib.discovery.candidates import Candidate
 from calib.discovery.laws.frames import frame_blocks
 from calib.discovery.laws.scan import Found, Scan
@@ -75,7 +77,16 @@ def law_leads(search: Search) -> bool:
     """Whether in the cell as it is a law promises more than any name does."""
     fit = search.best.fit
     laws = promising(fit, search, 1)
-    return bool(laws) and laws[0].worth > search.promised(fit)
+    if not laws or any(along_its_own(effect, laws[0].law) for effect in catalogue()):
+        return False
+    return laws[0].worth > search.promised(fit)
+
+
+def along_its_own(effect: Effect, law: Law) -> bool:
+    """Whether the law is along what the effect acts along: the same physics, in another form."""
+    places = {(law.site.name, c.name.removeprefix("inverse_")) for c in law.covariates}
+    places |= {(site, "distance") for site, along in places if along == "focus_distance"}
+    return not places.isdisjoint(effect.acts_along)
 
 
 def _rival(rival: Tried, best: Tried) -> str:

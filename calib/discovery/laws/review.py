@@ -9,7 +9,14 @@ import numpy as np
 from calib.chain.effect import Present
 from calib.chain.effects import catalogue
 from calib.chain.empirical import UNNAMED
-from calib.discovery.laws.contest import Tried, as_cell, fitted, promising, shortest_first
+from calib.discovery.laws.contest import (
+    Tried,
+    along_its_own,
+    as_cell,
+    fitted,
+    promising,
+    shortest_first,
+)
 from calib.discovery.laws.cross_validation import CrossValidation
 from calib.discovery.laws.frames import frame_blocks
 from calib.discovery.locate import Cell
@@ -34,7 +41,9 @@ def replaced_by_laws(search: Search) -> list[Cell]:
         _, without = search.missed(present)
         (score,) = score_effects(without, search.views, [blank(present)])
         laws = [
-            law for law in promising(without, search, _FITTED) if law.gain > _AS_GOOD * score.gain
+            law
+            for law in promising(without, search, _FITTED)
+            if law.gain > _AS_GOOD * score.gain and not along_its_own(present.effect, law.law)
         ]
         tried = fitted(without, search, laws)
         if not tried or tried[0].trial.criterion > search.best.criterion:
