@@ -19,7 +19,8 @@ from cell.storage.files.writing import yaml_text
 from cell.storage.recording import read_recording
 from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
 from cell.verbs.bootstrap.near_guard import NearGuard, carried_doubt_m
-from drivers.errors import SafetyError
+from drivers.arm import ArmState
+from drivers.errors import SafetyError, StopFailed
 from sim.arm import SimArm
 from tests.bootstrap.trials import Wrong, eye_to_hand, irb140, run_trial, ur3
 
@@ -73,6 +74,22 @@ def test_without_a_board_nothing_moves(tmp_path: Path) -> None:
     assert "board not found" in done.result.reason
     assert (done.result.frames, done.found) == (0, None)
     assert devices.arm.truth().joints_rad == pytest.approx(np.radians([31, -77, -110, -10, 10, 17]))
+
+
+def test_an_arm_that_somebody_moves_is_not_taken_over(tmp_path: Path) -> None:
+    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
+    devices = task.devices(dry_run=True)
+    read = devices.arm.state
+
+    def driven() -> ArmState:
+        state = read()
+        joints = np.array(state.joints_rad) + 0.05 * state.host_t_s
+        return replace(state, joints_rad=tuple(joints.tolist()))
+
+    devices.arm.state = driven  # type: ignore[method-assign]
+    with pytest.raises(StopFailed, match="THE ARM DOES NOT STOP"):
+        task.run(devices, simulated=True)
+    assert devices.arm.moves_made == 0  # type: ignore[attr-defined]
 
 
 def test_an_arm_of_another_model_is_not_moved(tmp_path: Path) -> None:

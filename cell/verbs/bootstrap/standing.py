@@ -7,19 +7,34 @@ from scipy.spatial.transform import RigidTransform
 
 from calib.views import FloatArray
 from cell.errors import InputError
+from cell.sequencer.confirmed_stop import ConfirmedStop
 from cell.sequencer.guard import Guard
+from cell.sequencer.sequencer import Devices
 from cell.sequencer.watched_arm import joints_of
-from drivers.arm import Arm, ArmState
+from drivers.arm import ArmState
+from drivers.errors import StopFailed
 
 _MODEL_M = 0.01
 _MODEL_RAD = float(np.radians(1.0))
 """A controller's own calibration moves its arm by millimetres; another model by centimetres."""
 
 
-def where_it_stands(arm: Arm) -> FloatArray:
-    """(6,) joint angles, read over a link of its own; raises `DeviceError`."""
+def where_it_stands(devices: Devices) -> FloatArray:
+    """(6,) joint angles, read over a link of its own.
+
+    Raises
+    ------
+    DeviceError
+        No link, or no joint angles.
+    StopFailed
+        Readings do not confirm that it stands.
+    """
+    arm = devices.arm
     try:
         arm.connect()
+        word = ConfirmedStop(arm, devices.clock).see_through()
+        if not word.stands:
+            raise StopFailed(word.text)
         return joints_of(arm.state())
     finally:
         arm.close()

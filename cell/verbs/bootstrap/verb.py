@@ -114,7 +114,7 @@ class Bootstrap:
         InputError, SafetyError, DeviceError
             Nothing was moved.
         """
-        start_rad = where_it_stands(devices.arm)
+        start_rad = where_it_stands(devices)
         guard = NearGuard.around(self.cell, start_rad, self.told)
         guard.check_surroundings()
         guide = self._guide(guard)
