@@ -49,6 +49,13 @@ def test_every_value_may_be_null_and_unknown_keys_are_kept(recording_folder: Fol
     assert '"humidity": 0.4' in recording.frames[0].as_line()
 
 
+def test_a_camera_s_clock_of_nanoseconds_is_a_number_like_others(recording_folder: Folder) -> None:
+    stamp = 1_795_000_000_123_456_789
+    line = frame_line(7, camera_raw={"host_timestamp_ns": stamp, "counter": 2**64 - 1})
+    (frame,) = read_recording(recording_folder(frames=line, detections=None)).frames
+    assert (frame.model_extra or {})["camera_raw"]["host_timestamp_ns"] == stamp
+
+
 def test_half_written_last_line_is_dropped_aloud(
     recording_folder: Folder, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -26,8 +26,9 @@ NESTING: Final = 64
 """Depth of lists and mappings in each other."""
 VALUES: Final = 2_000_000
 """Values in a file, with everything that an alias repeats counted every time."""
-MAGNITUDE: Final = 1e18
-"""No number is larger; in metres it is a hundred light years."""
+MAGNITUDE: Final = 1e20
+"""No number is larger: a camera's clock that counts nanoseconds since 1970 stands at 1.8e18, and
+64 bits end at 1.8e19."""
 SMALLEST: Final = 1e-12
 """What must be positive is larger: a picosecond, a picometre."""
 DIGITS: Final = 400
