@@ -76,6 +76,7 @@ def simulated(model: str, home: tuple[float, ...]) -> SimArm:
     arm = SimArm(kinematics_of(model), WallClock(), np.array(home))
     arm.connect()
     arm.state()  # its kinematics are compiled now, not while a driver waits for an answer
+    arm.close()
     return arm
 
 
