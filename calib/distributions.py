@@ -6,7 +6,7 @@ is more than many a fit takes.
 
 from __future__ import annotations
 
-from scipy.special import chdtrc, chdtri, chndtrinc, fdtrc, ndtr, ndtri
+from scipy.special import bdtrc, chdtrc, chdtri, chndtrinc, fdtrc, ndtr, ndtri
 
 
 def chi2_tail(value: float, freedom: float) -> float:
@@ -17,6 +17,11 @@ def chi2_tail(value: float, freedom: float) -> float:
 def chi2_limit(tail: float, freedom: float) -> float:
     """The value that a chi-square of `freedom` degrees exceeds with probability `tail`."""
     return float(chdtri(freedom, tail))
+
+
+def binomial_tail(count: int, trials: int, share: float) -> float:
+    """Probability that more than `count` of so many trials hit, each with probability `share`."""
+    return float(bdtrc(count, trials, share)) if count >= 0 else 1.0
 
 
 def f_tail(value: float, columns: float, freedom: float) -> float:

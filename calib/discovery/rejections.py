@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom
 
 from calib.calibration.result import Rejection
+from calib.distributions import binomial_tail
 
 _BY_CHANCE = 0.02
 """Share of frames that a sound run may lose to a wrong detection or an unlucky pose."""
@@ -41,7 +41,7 @@ def lost_frames(rejected: Sequence[Rejection], frames: NDArray[np.int64]) -> Los
     odd = {r.frame for r in rejected if not r.reason.startswith(_NOTHING_SEEN)}
     lost = np.isin(frames, list(odd))
     count, longest = int(lost.sum()), _longest_run(lost)
-    many = float(binom.sf(count - 1, len(frames), _BY_CHANCE))
+    many = binomial_tail(count - 1, len(frames), _BY_CHANCE)
     run = min(1.0, len(frames) * _BY_CHANCE**longest)
     if count == 0 or (many > _ALARM and longest < _RUN):
         return None

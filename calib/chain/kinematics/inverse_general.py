@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from scipy.stats import qmc
 
 from calib.chain.kinematics.dh import frames
 from calib.views import FloatArray
@@ -70,6 +69,8 @@ class GeneralInverse:
         return _distinct(self._polished(starts, base_from_flange))
 
     def _starts(self, near_rad: FloatArray) -> FloatArray:
+        from scipy.stats import qmc  # a second's import, for arms of a general shape only
+
         spread = qmc.Sobol(len(self._rows), seed=0).random_base2(_STARTS_LOG2)
         return np.asarray(near_rad + 2 * np.pi * (spread - 0.5))
 

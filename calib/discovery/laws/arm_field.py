@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import chi2
 
 from calib.chain.effect import Present
 from calib.chain.laws.arm_field import FIELD, coordinates, likeness, over, present_field
@@ -20,6 +19,7 @@ from calib.discovery.laws.frames import FrameNormals, frame_normals
 from calib.discovery.locate import Cell
 from calib.discovery.score import Score
 from calib.discovery.search import Search
+from calib.distributions import chi2_tail
 from calib.solver.joint import JointFit
 from calib.views import FloatArray, Views
 
@@ -152,7 +152,7 @@ def with_arm_field(search: Search) -> list[Cell]:
     if found is None:
         return []
     search.go_on_from(search.fitter.with_effects(fit, (*fit.model.effects, found.present)))
-    p_value = float(chi2.sf(max(found.gain, 0.0), 3))
+    p_value = chi2_tail(found.gain, 3)
     length = found.present.as_mapping()["length_scale"]
     return [
         Cell(

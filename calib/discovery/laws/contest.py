@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from calib.chain.effect import Effect
 from calib.chain.effects import catalogue
@@ -17,6 +16,7 @@ from calib.discovery.laws.scan import Found, Scan
 from calib.discovery.locate import Cell
 from calib.discovery.score import Score
 from calib.discovery.search import DEMAND, UNDECIDED, Search, Trial
+from calib.distributions import chi2_tail
 from calib.solver.joint import JointFit
 
 _IN_EARNEST = 3
@@ -101,7 +101,7 @@ def as_cell(told: Sequence[Tried], before: Trial) -> Cell:
     tried, rivals = told[0], told[1:]
     law = tried.found.law
     gain = before.fit.minus_two_log - tried.trial.fit.minus_two_log
-    p_value = float(chi2.sf(max(gain, 0.0), tried.found.columns))
+    p_value = chi2_tail(gain, tried.found.columns)
     covariate = "*".join(c.name for c in law.covariates)
     score = Score(gain, tried.found.columns, p_value, np.zeros(0))
     numbers = dict(law.numbers)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
@@ -32,6 +31,8 @@ def decode_picture(data: bytes, where: str) -> NDArray[np.generic]:
     InputError
         It is of no known format, has too many pixels, or is broken.
     """
+    import cv2  # many a verb reads files and no picture
+
     size = _size_px(data)
     if size is None:
         raise InputError(f"{where}: is not an image ({', '.join(FORMATS)})")

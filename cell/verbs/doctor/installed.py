@@ -19,6 +19,7 @@ _ALWAYS = (
     "scipy",
     "numba",
     "opencv-python-headless",
+    "pillow",
     "pydantic",
     "ruamel.yaml",
     "starlette",
