@@ -52,10 +52,11 @@ def shift(axis: int, length: Array) -> Array:
 
 
 def flange(joints: Array, dh: Array) -> Array:
-    """Denavit and Hartenberg's product of elementary transforms, row by row."""
+    """Denavit and Hartenberg's product of elementary transforms, and Hayati's, row by row."""
     pose = anp.eye(4)
-    for q, (theta, d, a, alpha) in zip(joints, dh, strict=True):
-        for step in (turn(2, q + theta), shift(2, d), shift(0, a), turn(0, alpha)):
+    for q, (theta, d, a, alpha, beta) in zip(joints, dh, strict=True):
+        steps = (turn(2, q + theta), shift(2, d), shift(0, a), turn(0, alpha), turn(1, beta))
+        for step in steps:
             pose = anp.dot(pose, step)
     return pose
 
