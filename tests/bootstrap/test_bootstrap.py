@@ -96,12 +96,16 @@ def test_an_arm_of_another_model_is_not_moved(tmp_path: Path) -> None:
     task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
     devices = task.devices(dry_run=True)
     other = task.cell.model_copy(
-        update={"robot": task.cell.robot.model_copy(update={"model": "ur5"})}
+        update={
+            "robot": task.cell.robot.model_copy(update={"model": "ur5"}),
+            "keep_out": (),
+            "workspace": None,
+        }
     )
     done = replace(task, cell=other).run(devices, simulated=True)
-    assert done.result.finish is Finish.BAD_INPUT
-    assert "robot.model: a ur5 with these joint angles" in done.result.reason
-    assert devices.arm.moves_made <= 1
+    assert done.result.finish is Finish.SAFETY
+    assert "at the joints it reports, a ur5's flange" in done.result.reason
+    assert devices.arm.moves_made == 0
 
 
 def with_mounted(cell: CellFile, turn: Rotation) -> CellFile:
@@ -159,10 +163,10 @@ def test_what_hangs_on_the_flange_is_held_against_boxes_by_what_it_may_be_off() 
         camera_m + np.array([0.14, 0.02, 0.02]),
     )
     ahead = Box(name="ahead", low_m=tuple(low_m.tolist()), high_m=tuple(high_m.tolist()))
-    sure.with_box(ahead).check_start()
+    sure.with_box(ahead).check_surroundings()
     doubtful = NearGuard.around(ur3(), start, LayoutDoubt(mount_m=0.1, mount_rad=0.0))
-    with pytest.raises(SafetyError, match=r"camera \(it may be 0.10 m off\) would strike"):
-        doubtful.with_box(ahead).check_start()
+    with pytest.raises(SafetyError, match=r"\(it may be 0.10 m off\) would strike"):
+        doubtful.with_box(ahead).check_surroundings()
 
 
 def test_a_guard_keeps_near(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from cell.devices.planned_camera import PlannedCamera
 from cell.errors import InputError
 from cell.sequencer.guard import Guard
 from cell.sequencer.guide import Guide
+from cell.sequencer.same_arm import check_same_arm
 from cell.sequencer.shot import Shot
 from cell.sequencer.watcher import Checked
 from cell.storage.files.cell_file import CellFile, Layout
@@ -34,7 +35,6 @@ from cell.verbs.bootstrap.probing_views import (
 )
 from cell.verbs.bootstrap.reach import Reach
 from cell.verbs.bootstrap.seen import Seen
-from cell.verbs.bootstrap.standing import check_model
 from drivers.errors import SafetyError
 
 _AFTER_A_LOSS = 0.6
@@ -108,7 +108,7 @@ class BootstrapGuide(Guide):
     def _learn(self) -> None:
         self._lost += not self._new
         for shot, detection in self._new:
-            check_model(self._guard, shot.state)
+            check_same_arm(self._guard.kinematics, shot.state)
             self._add(shot, detection)
             self._here = np.array(shot.state.joints_rad)
         self._new.clear()

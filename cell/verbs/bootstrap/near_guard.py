@@ -71,7 +71,6 @@ class NearGuard(Guard):
 
     def check_move(self, start_rad: FloatArray, end_rad: FloatArray, where: str) -> None:
         """Raise `SafetyError` where boxes, limits or the neighbourhood refuse the move."""
-        super().check_move(start_rad, end_rad, where)
         path = self.path(start_rad, end_rad)
         if (np.abs(path - self.start_rad) > TRAVEL_RAD + 1e-6).any():
             raise SafetyError(f"{where}: a joint would turn too far from where the arm stood")
@@ -85,6 +84,7 @@ class NearGuard(Guard):
                 f" {np.degrees(turned_rad):.0f}° from where it stood; a bootstrap stays within"
                 f" {1e3 * FARTHEST_M:.0f} mm and {np.degrees(FARTHEST_RAD):.0f}°"
             )
+        super().check_move(start_rad, end_rad, where)
 
 
 def carried_doubt_m(cell: CellFile, told: LayoutDoubt) -> float:

@@ -15,6 +15,7 @@ from cell.devices.planned_camera import PlannedCamera
 from cell.errors import BadAnswer, InputError
 from cell.sequencer.guard import Guard
 from cell.sequencer.guide import Guide
+from cell.sequencer.same_arm import check_same_arm
 from cell.sequencer.watcher import Checked
 from cell.storage.files.cell_file import CellFile, Layout
 from cell.storage.files.parts import Pose
@@ -23,7 +24,6 @@ from cell.verbs.bootstrap.guide import BootstrapGuide, view_of
 from cell.verbs.bootstrap.layout_doubt import LayoutDoubt
 from cell.verbs.bootstrap.near_guard import NearGuard
 from cell.verbs.bootstrap.seen import Seen
-from cell.verbs.bootstrap.standing import check_model
 from drivers.errors import SafetyError
 
 _LARGEST_M, _SMALLEST_M = 0.02, 0.006
@@ -80,7 +80,7 @@ class ProbingGuide(Guide):
                 f" {1e3 * float(np.linalg.norm(self._shifts[-1])):.0f} mm: start with it in the"
                 " middle of the picture"
             )
-        check_model(self._guard, self._frames[-1].shot.state)
+        check_same_arm(self._guard.kinematics, self._frames[-1].shot.state)
         views = self._views()
         if len(self._shifts) < len("xyz"):
             return self._shift(views)
