@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.fault_runs.stands import STANDS, Stand
@@ -44,7 +45,7 @@ def arm(stand: tuple[str, Stand]) -> Iterator[WatchedArm]:
         here = arm.connect()
         threading.Thread(target=ask_on_the_way, args=(devices, stop), daemon=True).start()
         with pytest.raises(StoppedByOperator):
-            arm.go(here - 10 * _SLOW_RAD_S, "a slow move")
+            arm.go(here - 10 * _SLOW_RAD_S * np.eye(6)[5], "a slow turn of the wrist")
         yield arm
     finally:
         devices.arm.restore()
