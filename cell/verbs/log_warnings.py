@@ -43,7 +43,7 @@ def mixup_warnings(mixups: tuple[Mixup, ...]) -> list[dict[str, str]]:
         {
             "what": mixup.physics,
             "where": f"the log ({mixup.name})",
-            "remedy": mixup.remedy,
+            "remedy": " ".join(part for part in (mixup.remedy, mixup.apart) if part),
         }
         for mixup in mixups
     ]

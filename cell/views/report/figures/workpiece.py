@@ -39,8 +39,8 @@ def _answer(ax: Axes, data: ReportData) -> None:
     shared = shared_by_distance(data.calibration or {})
     if shared is not None:
         distance_m, sigma_m = shared
-        ax.plot(distance_m, SIGMAS * sigma_m * 1e3, linestyle="--", color="0.4",
+        ax.plot(distance_m, SIGMAS * sigma_m * 1e3, linestyle="--", color="#666666",
                 label="calibration as a whole, two sigma")  # fmt: skip
     error = (answer_of(data) or {}).get("error_at_work_piece_m")
     if error is not None:
-        ax.axhline(error["p95"] * 1e3, linestyle=":", color="0.2", label="answer, 95 %")
+        ax.axhline(error["p95"] * 1e3, linestyle=":", color="#333333", label="answer, 95 %")
