@@ -57,7 +57,8 @@ def usable_frames(views: Views) -> Usable:
 def _first_of_copies(views: Views) -> NDArray[np.int64]:
     """(N,) the first view with the same corners and pose, bit for bit; itself mostly."""
     known: dict[bytes, int] = {}
-    both = zip(views.corners_px, views.base_from_flange, views.seen.any(axis=1), strict=True)
+    some = views.seen.sum(axis=1) > 0
+    both = zip(views.corners_px, views.base_from_flange, some, strict=True)
     return np.array(
         [
             known.setdefault(corners.tobytes() + pose.tobytes(), i) if seen else i
