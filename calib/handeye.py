@@ -25,6 +25,10 @@ OUTLIER_SIGMA = 10.0
 
 MIN_FRAMES = 4
 _UNIT_RANGE = (0.7, 1.4)
+_NO_UNIT_SHARE = 0.1
+"""Miss over the way above which no unit of length explains poses and pictures."""
+
+_SAME_UNIT = 0.3
 _LATERAL, _DEPTH, _ANGLES = slice(0, 2), slice(2, 3), slice(3, 6)
 _TELLING = np.array([True, True, False, True, True, True])
 _NOT_ANOTHER_POSE = np.array([3e-3] * 3 + [np.radians(0.5)] * 3)
@@ -125,7 +129,8 @@ def solve_hand_eye(
     known: BoolArray = np.asarray(both.all(axis=(1, 2)))
     if known.sum() < MIN_FRAMES:
         raise CalibrationError(
-            f"{known.sum()} frames have both a board and a flange pose; hand-eye needs {MIN_FRAMES}"
+            f"{known.sum()} frames have both a board and a flange pose",
+            f"hand-eye needs {MIN_FRAMES}, better 15 with the wrist turned about two axes",
         )
     _check_motion(base_from_flange[known])
     problem = _Problem(mount, camera_from_board, base_from_flange, board_centre_m)
@@ -176,17 +181,45 @@ def _check_motion(base_from_flange: FloatArray) -> None:
     if spread[0] < _MIN_ROTATION_RAD:
         raise CalibrationError(
             "the flange keeps one orientation (pure translation): where the camera sits on it"
-            " cannot be known; add views with the wrist turned by 20 degrees and more"
+            " cannot be known",
+            "add views with the wrist turned by 20 degrees and more about two axes",
         )
     if spread[1] < _MIN_ROTATION_RAD / 3:
         raise CalibrationError(
             "the flange turns about one axis only: the camera's place along that axis cannot be"
-            " known; add views turned about a second axis"
+            " known",
+            "add views turned by 20 degrees and more about a second axis",
         )
 
 
 def _check_length_unit(problem: _Problem, known: BoolArray, X: FloatArray) -> None:
-    """Solve the translations with the robot's unit of length free: it should come out as one."""
+    """Solve the translations with the robot's unit of length free: it should come out as one.
+
+    Where they do not fit with any unit, the poses are not these pictures', which is no matter of
+    a unit.
+    """
+    factor, share = _length_factor(problem, known, X)
+    if share > _NO_UNIT_SHARE:
+        if not _UNIT_RANGE[0] < factor < _UNIT_RANGE[1]:
+            raise CalibrationError(
+                f"the logged positions do not go with the pictures: with any unit of length they"
+                f" miss by {share:.0%} of the flange's way",
+                "check which picture each pose is of, and whether tool or base frame was changed"
+                " midway; `cell diagnose` names mix-ups of the log",
+            )
+        return
+    if factor < 0:
+        raise CalibrationError(
+            "the pictures are mirrored: they go with the logged poses only with every length"
+            " negative",
+            "switch the camera's mirroring (ReverseX) off, or flip the pictures left to right",
+        )
+    if not _UNIT_RANGE[0] < factor < _UNIT_RANGE[1]:
+        raise CalibrationError(*_other_unit(1.0 / factor))
+
+
+def _length_factor(problem: _Problem, known: BoolArray, X: FloatArray) -> tuple[float, float]:
+    """Metres of the board in a unit of the log, and the median miss over the flange's way."""
     C = problem.camera_from_board[known]
     C = C if problem.mount == "eye_in_hand" else inverse(C)
     F = problem.base_from_flange[known]
@@ -194,12 +227,33 @@ def _check_length_unit(problem: _Problem, known: BoolArray, X: FloatArray) -> No
     moved = back @ F[:, :3, 3, None]
     left = np.concatenate([np.tile(np.eye(3), (len(F), 1, 1)), -back, moved], axis=2)
     right = -(C[:, :3, 3] @ X[:3, :3].T)
-    unit = float(np.linalg.lstsq(left.reshape(-1, 7), right.ravel(), rcond=None)[0][6])
-    if not _UNIT_RANGE[0] < unit < _UNIT_RANGE[1]:
-        raise CalibrationError(
-            f"the logged positions and the board's squares disagree about length by a factor of"
-            f" {1 / unit if unit else np.inf:.4g}: check base_from_flange.p_m (metres) and square_m"
-        )
+    used = np.ones(len(F), dtype=bool)
+    for _ in range(4):
+        solved = np.linalg.lstsq(left[used].reshape(-1, 7), right[used].ravel(), rcond=None)[0]
+        miss = np.linalg.norm(left @ solved - right, axis=1)
+        again = miss <= max(4 * float(np.median(miss)), 1e-9)
+        if (again == used).all() or again.sum() < MIN_FRAMES:
+            break
+        used = again
+    factor = float(solved[6])
+    way = np.linalg.norm(F[:, :3, 3] - F[:, :3, 3].mean(axis=0), axis=1).mean() * abs(factor)
+    return factor, float(np.median(miss)) / max(float(way), 1e-12)
+
+
+def _other_unit(ratio: float) -> tuple[str, str]:
+    """What to say of positions that are `ratio` times as large as the board's metres."""
+    words = (
+        "the logged positions and the board's squares disagree about length by a factor of"
+        f" {ratio:.4g}"
+    )
+    for name, count in (("millimetres", 1000.0), ("centimetres", 100.0), ("inches", 1 / 0.0254)):
+        if abs(np.log(ratio / count)) < _SAME_UNIT:
+            return (
+                f"{words}: the positions are in {name}, under a key that says metres"
+                " (base_from_flange.p_m), or square_m is so many times too small",
+                f"write p_m in metres (divide by {count:.6g}), or mend square_m",
+            )
+    return words, "check base_from_flange.p_m (metres) and the board's square_m"
 
 
 def _closed_form_robust(problem: _Problem, known: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -52,8 +52,9 @@ def prepare(arguments: Sequence[str]) -> None:
         if own is not None:
             os.environ[VARIABLE] = str(own)
     forget_stale()
-    asked = next(iter(arguments), "")
-    if asked in VERBS and "--help" not in arguments and not _kept():
+    asked = next((word for word in arguments if word in VERBS), None)
+    helps = {"-h", "--help"} & set(arguments)
+    if asked is not None and not helps and not _kept():
         sys.stderr.write(
             "first use here: compiling for this processor, once, some twenty seconds\n"
         )

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calib.calibration.result import Rejection
 from calib.errors import CalibrationError
 from calib.paper.homography import robust_homographies
 from calib.views import BoolArray, FloatArray, Views
 
+COPY = "identical to frame"
 CORNERS_NEEDED = 8
 FRAMES_NEEDED = 3
 
@@ -33,13 +35,18 @@ def usable_frames(views: Views) -> Usable:
     CalibrationError
         Fewer than three frames are left.
     """
-    seen = views.seen.sum(axis=1)
-    few = seen < CORNERS_NEEDED
+    seen, first = views.seen.sum(axis=1), _first_of_copies(views)
+    copy = first != np.arange(len(views))
+    few = (seen < CORNERS_NEEDED) | copy
     corners_px = np.where(few[:, None, None], np.nan, views.corners_px)
     homographies, good, failed = robust_homographies(views.board.corners_m[:, :2], corners_px)
     failed |= {
         int(i): "no corners" if seen[i] == 0 else f"only {seen[i]} corners seen"
         for i in np.flatnonzero(few)
+    }
+    failed |= {
+        int(i): f"{COPY} {views.frame[first[i]]} to the last bit: counted once"
+        for i in np.flatnonzero(copy)
     }
     rejected = [Rejection(int(views.frame[i]), failed[i]) for i in sorted(failed)]
     used: BoolArray = np.asarray(np.isfinite(homographies).all(axis=(1, 2)))
@@ -47,10 +54,24 @@ def usable_frames(views: Views) -> Usable:
     return Usable(homographies, used, good, tuple(rejected))
 
 
+def _first_of_copies(views: Views) -> NDArray[np.int64]:
+    """(N,) the first view with the same corners and pose, bit for bit; itself mostly."""
+    known: dict[bytes, int] = {}
+    some = views.seen.sum(axis=1) > 0
+    both = zip(views.corners_px, views.base_from_flange, some, strict=True)
+    return np.array(
+        [
+            known.setdefault(corners.tobytes() + pose.tobytes(), i) if seen else i
+            for i, (corners, pose, seen) in enumerate(both)
+        ]
+    )
+
+
 def require_frames(usable: int, recorded: int) -> None:
     """Refuse to calibrate on fewer than three frames."""
     if usable < FRAMES_NEEDED:
         raise CalibrationError(
-            f"{usable} of {recorded} frames are usable; a calibration needs at least"
-            f" {FRAMES_NEEDED} with the board tilted differently (15 and more are better)"
+            f"{usable} of {recorded} frames are usable",
+            f"a calibration needs at least {FRAMES_NEEDED} with the board tilted differently"
+            " (15 and more are better)",
         )

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from calib.calibration.caution import Caution
 from calib.calibration.cross_validation import CrossValidation
 from calib.calibration.held_out import ChiSquare, HeldOut
 from calib.calibration.identifiability import Weakness
@@ -61,14 +62,25 @@ def as_mapping(calibration: Calibration, recording: str) -> dict[str, Any]:
         "focus_law": None if law is None else _law(calibration, law),
         "solutions": {name: _solution(c, name) for name in c.solutions},
         **_transforms(c.robot),
-        "robot": None if c.robot is None else _robot(c.robot),
+        "robot": {} if c.robot is None else _robot(c.robot),
         "uncertainty": None if c.uncertainty is None else _uncertainty(c.uncertainty),
         "cross_validation": None
         if c.cross_validation is None
         else _cross_validation(c.cross_validation),
         "not_separable": [_weakness(w) for w in c.weaknesses],
+        "warnings": [{"what": w.what, "where": w.where, "remedy": w.remedy} for w in c.cautions],
+        "undetermined": _undetermined(c.cautions),
         "missing": dict(c.missing),
     }
+
+
+def _undetermined(cautions: tuple[Caution, ...]) -> dict[str, str]:
+    """Why each part is not determined, by the first caution that says so."""
+    found: dict[str, str] = {}
+    for caution in cautions:
+        for part in caution.undetermined:
+            found.setdefault(part, caution.what)
+    return found
 
 
 def _cross_validation(found: CrossValidation) -> dict[str, Any]:

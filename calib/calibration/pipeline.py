@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calib.calibration.baseline import Baseline, fit_baseline, fit_subset
+from calib.calibration.cautions import cautions
 from calib.calibration.cross_validation import CrossValidation, cross_validate
 from calib.calibration.frames import usable_frames
 from calib.calibration.identifiability import Weakness, find_weaknesses
@@ -52,7 +53,7 @@ def calibrate(views: Views) -> Calibration:
     if baseline.algebraic is not None:
         solutions["zhang_algebraic"] = baseline.algebraic
     missing = dict(baseline.missing)
-    robot = _robot(views, baseline, missing)
+    robot, fault = _robot(views, baseline, missing)
     paper = PaperResult((), None, None, None, {}, {})
     if robot is not None:
         paper = _paper(views, baseline, usable.homographies, robot)
@@ -65,10 +66,11 @@ def calibrate(views: Views) -> Calibration:
     reference = None if robot is None else robot.reference
     span_m = _distance_range_m(views, solutions.get("joint_ml", baseline.mle))
     cross_validation = _cross_validation(views, robot, span_m, missing)
+    rejected = tuple(sorted(baseline.rejected, key=lambda r: r.frame))
     return Calibration(
         frame=views.frame,
         used=baseline.used,
-        rejected=tuple(sorted(baseline.rejected, key=lambda r: r.frame)),
+        rejected=rejected,
         wrong=_wrong_corners(views, baseline, robot),
         solutions=solutions,
         scale_factors=paper.scale_factors,
@@ -83,6 +85,7 @@ def calibrate(views: Views) -> Calibration:
         weaknesses=_weaknesses(views, robot),
         uncertainty=_uncertainty(views, robot, span_m),
         cross_validation=cross_validation,
+        cautions=cautions(views, solutions, reference, fault, rejected, cross_validation),
     )
 
 
@@ -137,12 +140,14 @@ def robot_after(views: Views, baseline: Baseline) -> RobotFit:
     )
 
 
-def _robot(views: Views, baseline: Baseline, missing: dict[str, str]) -> RobotFit | None:
+def _robot(
+    views: Views, baseline: Baseline, missing: dict[str, str]
+) -> tuple[RobotFit | None, CalibrationError | None]:
     try:
-        return robot_after(views, baseline)
+        return robot_after(views, baseline), None
     except CalibrationError as error:
         missing |= dict.fromkeys(_ROBOT_RESULTS, str(error))
-        return None
+        return None, error
 
 
 def _paper(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.calibration.caution import Caution
 from calib.calibration.cross_validation import CrossValidation
 from calib.calibration.identifiability import Weakness
 from calib.calibration.uncertainty import UncertaintyMap
@@ -205,6 +206,8 @@ class Calibration:
         Of the joint fit's camera over image and distance; None without a joint fit.
     cross_validation:
         The joint fit without some of its frames; None with a reason in `missing`.
+    cautions:
+        What is known to be wrong or undetermined, with the way to mend it.
     """
 
     frame: np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -224,3 +227,4 @@ class Calibration:
     weaknesses: tuple[Weakness, ...] = ()
     uncertainty: UncertaintyMap | None = None
     cross_validation: CrossValidation | None = None
+    cautions: tuple[Caution, ...] = ()

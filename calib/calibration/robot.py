@@ -36,6 +36,7 @@ REPEATABLE_M, REPEATABLE_RAD = 1e-4, 5e-4
 """What data sheets promise: an arm whose scatter is below both has no errors worth a law."""
 
 _ALPHA_RANGE = 1.3
+_ROUNDING = 1e-9
 _FOCUS_LAWS = ("inverse_square", "thin_lens")
 _POSE = tuple(
     f"{frame}.{axis}"
@@ -136,7 +137,16 @@ def _plausible(joint: JointFit, plain: CellModel) -> bool:
     """Whether the joint fit stayed near the pictures' own answer, whatever the robot said."""
     alpha = COLUMN["alpha_px"]
     ratio = joint.model.optics[alpha] / plain.optics[alpha]
-    return bool(np.isfinite(joint.covariance).all() and 1 / _ALPHA_RANGE < ratio < _ALPHA_RANGE)
+    return 1 / _ALPHA_RANGE < ratio < _ALPHA_RANGE and _is_covariance(joint.covariance)
+
+
+def _is_covariance(matrix: FloatArray) -> bool:
+    """Whether no direction has a variance below zero: a fit that came to rest has none."""
+    variance = np.diag(matrix)
+    if not (np.isfinite(matrix).all() and (variance > 0).all()):
+        return False
+    scale = 1.0 / np.sqrt(variance)
+    return bool(np.linalg.eigvalsh(matrix * scale[:, None] * scale).min() > -_ROUNDING)
 
 
 def _without_skew(optics: FloatArray) -> FloatArray:

@@ -31,8 +31,8 @@ def why(found: CrossValidation) -> str:
 def _agree(held: HeldOut) -> str:
     return (
         "Fits without a fifth of the frames each agree with the fit of all within the stated"
-        f" uncertainty, and miss the frames left out by {held.rms_px:.2g} px where"
-        f" {held.expected_px:.2g} px is expected."
+        f" uncertainty, and miss the frames left out, poses tied to the robot, by"
+        f" {held.rms_px:.2g} px where {held.expected_px:.2g} px is expected."
     )
 
 
@@ -54,8 +54,8 @@ def _moved(found: CrossValidation) -> Iterator[str]:
 def _missed(held: HeldOut) -> Iterator[str]:
     if held.miss.each > held.miss.band[1]:
         yield (
-            f"Frames left out are missed by {held.rms_px:.2g} px where {held.expected_px:.2g} px"
-            " is expected."
+            "Frames left out, poses tied to the robot, are missed by"
+            f" {held.rms_px:.2g} px where {held.expected_px:.2g} px is expected."
         )
     for part, what in ((held.robot, "the robot's poses"), (held.picture, "their pictures")):
         if part.each > part.band[1]:

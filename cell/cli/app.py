@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -25,7 +27,7 @@ from cell.cli.unforeseen import words_of
 from cell.cli.verify import verify
 from cell.compiled import prepare
 from cell.errors import EXIT_BAD_ANSWER, EXIT_DONE, EXIT_OPERATOR, exit_status_of
-from cell.views.terminal.output import say, say_error
+from cell.views.terminal.output import keep_log, say, say_error
 
 app = typer.Typer(
     name="cell",
@@ -34,7 +36,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     # boxes and colours would read markdown's parser first, longer than all the rest takes
     rich_markup_mode=None,
-    context_settings={"max_content_width": 110},
+    context_settings={"max_content_width": 110, "help_option_names": ["-h", "--help"]},
 )
 VERBS: dict[str, Callable[..., None]] = {
     "run": run,
@@ -50,6 +52,37 @@ VERBS: dict[str, Callable[..., None]] = {
     "study": study,
     "doctor": doctor,
 }
+
+
+def _say_version(asked: bool) -> None:
+    """Print the version and leave."""
+    if asked:
+        from importlib.metadata import version
+
+        sys.stdout.write(f"calibration-cell {version('calibration-cell')}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def before_every_verb(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", callback=_say_version, is_eager=True, help="Say the version."),
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("-v", "--verbose", help="Say more of what is done, on stderr.")
+    ] = False,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="Keep everything that is said of it in a file.")
+    ] = None,
+) -> None:
+    """Calibrate a camera on a robot, and name the physics a plain model leaves out."""
+    if verbose:
+        logging.getLogger().setLevel(logging.INFO)
+    if log is not None:
+        keep_log(log)
+
+
 for name, verb in VERBS.items():
     app.command(name, cls=WithPage if verb is run else None)(verb)
 

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from cell.cli.json_flag import JsonFlag
-from cell.views.terminal.output import show
+from cell.errors import BadAnswer
+from cell.views.terminal.output import say, show
 
 
 def calibrate(
@@ -22,12 +23,21 @@ def calibrate(
     from cell.storage.recording import read_recording
     from cell.verbs.calibrate import calibrate_into
     from cell.views.terminal.progress import counted_progress
-    from cell.views.terminal.summary import calibration_summary
+    from cell.views.terminal.summary import (
+        calibration_summary,
+        undetermined_words,
+        warning_lines,
+    )
 
     source = read_recording(recording)
     with counted_progress("finding corners") as progress:
         calibrated, folder = calibrate_into(
             source, output, progress=progress, simulated=source.header.simulated
         )
+    for line in warning_lines(calibrated.mapping):
+        say(line)
     text = f"{calibration_summary(calibrated.mapping)}\nreport: {folder / 'report.html'}"
     show(text, calibrated.mapping, as_json=as_json)
+    missing = undetermined_words(calibrated.mapping)
+    if missing is not None:
+        raise BadAnswer(f"{recording}: {missing}")

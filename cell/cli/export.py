@@ -18,7 +18,12 @@ from cell.views.terminal.output import say, show
 def export(
     calibration: Annotated[Path, typer.Argument(help="A calibration.json, or its folder.")],
     tool: Annotated[
-        str, typer.Option("--format", help="ros, opencv, mrcal, kalibr, colmap or json.")
+        str,
+        typer.Option(
+            "--format",
+            help="The camera for ros, opencv, mrcal, kalibr, colmap, json; its place and the"
+            " board's for tf, urdf, ur, abb, moveit, easy_handeye2, text.",
+        ),
     ],
     distance: Annotated[
         float | None,
@@ -33,9 +38,15 @@ def export(
     image_size: Annotated[
         str | None, typer.Option(help="WIDTHxHEIGHT, for a file that does not tell.")
     ] = None,
+    frame: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="base=NAME, flange=NAME, camera=NAME or board=NAME: what your tool calls it."
+        ),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Write the calibrated camera for ROS, OpenCV, mrcal, Kalibr, COLMAP or as JSON."""
+    """Hand over the calibrated camera, or its place on the robot, in another tool's format."""
     from cell.storage.files.calibration_place import calibration_file
     from cell.storage.whole import write_whole
     from cell.verbs.export import export_calibration, read_calibration
@@ -49,6 +60,7 @@ def export(
             distance_m=distance,
             solution=solution,
             image_size_px=None if image_size is None else _size(image_size),
+            frames=dict(_frame(words) for words in frame or ()),
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -63,6 +75,13 @@ def export(
     written = None if output is None else str(output)
     result = {"format": tool, "file": written, "text": exported.text, "warnings": exported.warnings}
     show(f"{tool}: {output}", result, as_json=as_json)
+
+
+def _frame(words: str) -> tuple[str, str]:
+    name, _, given = words.partition("=")
+    if not given:
+        raise InputError(f"--frame {words}: must be FRAME=NAME, such as camera=wrist_camera")
+    return name.strip(), given.strip()
 
 
 def _size(words: str) -> tuple[int, int]:

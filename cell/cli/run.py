@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from cell.cli.json_flag import JsonFlag
-from cell.errors import InputError
+from cell.errors import EXIT_BAD_ANSWER, EXIT_DONE, InputError
 from cell.storage.files.results import new_folder
 from cell.views.page.address import DEFAULT
 from cell.views.terminal.output import say, say_error, show
@@ -87,7 +87,10 @@ def run(
         words = ["cell", "run", str(path), "-o", str(folder), *(f for f in flags if flags[f])]
         words += [] if page is None else ["--page", page]
         say(f"when that is mended, go on with: {shlex.join(words)} --resume")
-    raise typer.Exit(result.finish.exit_status)
+    if outcome.undetermined is not None:
+        say_error(outcome.undetermined)
+    undetermined = EXIT_BAD_ANSWER if outcome.undetermined is not None else EXIT_DONE
+    raise typer.Exit(result.finish.exit_status or undetermined)
 
 
 def _plan_path(plan: Path | None, dry_run: bool) -> Path:

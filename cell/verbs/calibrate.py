@@ -14,9 +14,11 @@ from calib.errors import CalibrationError
 from calib.views import Views
 from cell.errors import BadAnswer
 from cell.storage.files.calibration_file import CalibrationFile
+from cell.storage.files.made_by import made_by
 from cell.storage.files.results import results_folder, write_results
 from cell.storage.recording import Corners, Recording, write_corners
 from cell.storage.recording.detect import Progress, corners_of
+from cell.verbs.log_warnings import log_mixups, mixup_warnings
 from cell.views.report import (
     ReportData,
     recording_data,
@@ -24,6 +26,7 @@ from cell.views.report import (
     solution_residuals,
     write_report,
 )
+from cell.views.report.answer_values import work_out
 
 FILE_NAME = "calibration.json"
 
@@ -79,11 +82,31 @@ def calibrate_recording(
         result = calibrate(views)
     except CalibrationError as error:
         raise BadAnswer(f"{recording.path}: {error}{_first_reasons(corners)}") from None
-    mapping = as_mapping(result, recording.name)
+    mixups = log_mixups(views, result)
+    stale = next((mixup for mixup in mixups if mixup.name == "stale_poses"), None)
+    if stale is not None:
+        # rows that repeat another's are no poses of their own; the rest of the log may well do
+        views = stale.mend(views, views)
+        result = calibrate(views)
+    mapping = as_mapping(result, recording.name) | made_by()
+    mapping |= _devices(recording, mapping["robot"])
+    mapping["warnings"] = mixup_warnings(mixups) + mapping["warnings"]
     for rejection in mapping["frames_rejected"]:
         rejection["reason"] = corners.rejected.get(rejection["frame"], rejection["reason"])
+    calibrated = Calibrated(views, result, mapping)
+    mapping["answer"] = work_out(report_data(recording, calibrated))
     checked = CalibrationFile.model_validate(mapping)
-    return Calibrated(views, result, checked.model_dump(mode="json", by_alias=True))
+    return replace(calibrated, mapping=checked.model_dump(mode="json", by_alias=True))
+
+
+def _devices(recording: Recording, robot: dict[str, Any]) -> dict[str, Any]:
+    """Which camera and robot, with what a fit said of it, and when they recorded."""
+    header = recording.header.as_mapping()
+    return {
+        "recorded": header.get("created"),
+        "camera": {key: header["camera"].get(key) for key in ("model", "serial")},
+        "robot": {key: header["robot"].get(key) for key in ("model", "serial")} | robot,
+    }
 
 
 def _first_reasons(corners: Corners) -> str:

@@ -27,7 +27,13 @@ from cell.views.running_estimate.early_end import EarlyEnd
 from cell.views.running_estimate.process import RunningEstimate
 from cell.views.terminal.output import say
 from cell.views.terminal.progress import run_progress
-from cell.views.terminal.summary import calibration_summary, diagnosis_summary
+from cell.views.terminal.summary import (
+    answer_line,
+    calibration_summary,
+    diagnosis_summary,
+    undetermined_words,
+    warning_lines,
+)
 
 if TYPE_CHECKING:
     from cell.views.page.live_run import LiveRun
@@ -140,12 +146,15 @@ class Outcome:
         Every view was taken or given up: there is something to calibrate.
     text, mapping:
         For people, and for programs.
+    undetermined:
+        What of the calibration the frames do not determine, in words.
     """
 
     folder: Path
     complete: bool
     text: str
     mapping: dict[str, Any]
+    undetermined: str | None = None
 
     @property
     def files(self) -> dict[str, str]:
@@ -196,10 +205,15 @@ def evaluate(
         write_corners(outcome.folder / DETECTIONS, corners, recording.board)
     tell("calibrating")
     calibrated, folder = calibrate_into(recording, outcome.folder, simulated=simulated)
+    for line in warning_lines(calibrated.mapping):
+        tell(line)
     calibrates = replace(
         outcome,
+        undetermined=undetermined_words(calibrated.mapping),
         text=f"{outcome.text}\n{calibration_summary(calibrated.mapping)}",
-        mapping=outcome.mapping | _files(folder, "calibration.json", "report.html"),
+        mapping=outcome.mapping
+        | _files(folder, "calibration.json", "report.html")
+        | {name: calibrated.mapping[name] for name in ("answer", "warnings", "undetermined")},
     )
     tell("diagnosing; this takes a minute or more")
     try:
@@ -210,7 +224,14 @@ def evaluate(
         return replace(calibrates, text=f"{calibrates.text}\nnot diagnosed: {undiagnosed}")
     return replace(
         calibrates,
-        text=f"{calibrates.text}\n{diagnosis_summary(diagnosed.mapping)}",
+        text="\n".join(
+            (
+                outcome.text,
+                calibration_summary(calibrated.mapping, answer=False),
+                diagnosis_summary(diagnosed.mapping),
+                answer_line(calibrated.mapping),
+            )
+        ),
         mapping=calibrates.mapping
         | _files(folder, "diagnosis.json", "twin.yaml")
         | {"verdict": diagnosed.mapping["verdict"]},

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cell.views.report.data import ReportData, SolutionPoses
-from cell.views.report.figures.workpiece import by_distance, of_solution
 from cell.views.report.geometry import position_error_m, tilt_rad, workpiece_error_m
+from cell.views.report.workpiece_error import by_distance, of_solution
 
 
 def test_a_camera_too_close_has_positive_z_and_costs_that_much_at_the_work_piece() -> None:

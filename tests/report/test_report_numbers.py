@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from cell.views.report.numbers import measured, number, plus_minus, probability, symbol
+from cell.views.numbers import measured, number, plus_minus, probability, symbol
 
 
 @pytest.mark.parametrize(

@@ -15,13 +15,13 @@ import pytest
 
 from calib.calibration import calibrate
 from calib.calibration.mapping import as_mapping
+from cell.views.numbers import millimetres
 from cell.views.report import ReportData
-from cell.views.report.figures.workpiece import of_solution
-from cell.views.report.numbers import millimetres
 from cell.views.report.sections.answer import answer
 from cell.views.report.sections.tables import tables
 from cell.views.report.sections.trust import sentences
 from cell.views.report.sections.uncertainty import in_words, uncertainty
+from cell.views.report.workpiece_error import of_solution
 from tests.paper.scene import scene
 
 

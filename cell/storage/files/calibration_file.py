@@ -177,17 +177,57 @@ class TransformPart(ResultPart):
 
 
 class RobotPart(ResultPart):
-    """What the joint fit said of robot and noise."""
+    """Which robot, and what the fit with its poses said of it; null where there was no such fit."""
 
-    mount: Literal["eye_in_hand", "eye_to_hand"]
-    source: Literal["joint", "hand_eye"]
-    focus_law: str | None
-    focus_law_gain_aic: float
-    flange_sigma_m: Sigma
-    flange_sigma_rad: Sigma
-    corner_sigma_px: Sigma
-    outliers: tuple[int, ...]
+    model: str | None = None
+    serial: str | None = None
+    mount: Literal["eye_in_hand", "eye_to_hand"] | None = None
+    source: Literal["joint", "hand_eye"] | None = None
+    focus_law: str | None = None
+    focus_law_gain_aic: float | None = None
+    flange_sigma_m: Sigma | None = None
+    flange_sigma_rad: Sigma | None = None
+    corner_sigma_px: Sigma | None = None
+    outliers: tuple[int, ...] = ()
     """Frames whose logged pose disagrees with their picture."""
+
+
+class CameraPart(ResultPart):
+    """Which camera, as far as the recording tells."""
+
+    model: str | None = None
+    serial: str | None = None
+
+
+class WarningPart(ResultPart):
+    """One thing that is known to be wrong or undetermined."""
+
+    what: str
+    where: str
+    remedy: str
+
+
+class WorkPieceErrorPart(ResultPart):
+    """How far from its true place the arm would meet a part located by one picture, metres."""
+
+    p95: Sigma
+    """What 95 % of pictures stay below, with two sigma of what all pictures share."""
+    rms: Sigma
+    """RMS of the pictures, with one sigma of what they share."""
+    each_picture_p95: Sigma
+    each_picture_rms: Sigma
+    calibration_sigma: Sigma | None
+    """One sigma that all pictures share, at the worst distance; null without a joint fit."""
+    against: str
+    """What the pictures were held against."""
+
+
+class AnswerPart(ResultPart):
+    """For which distances the camera may be used, with what error at the work piece."""
+
+    usable_distances_m: tuple[PositiveFloat, PositiveFloat] | None
+    error_at_work_piece_m: WorkPieceErrorPart | None
+    limits: tuple[str, ...]
 
 
 class NotSeparable(ResultPart):
@@ -308,6 +348,18 @@ class CalibrationFile(ResultPart):
 
     schema_: Literal["cell.calibration/1"] = Field(alias="schema")
     recording: str
+    recorded: str | None = None
+    """When the recording was begun, as it says itself."""
+    created: str | None = None
+    """When this calibration was made, ISO 8601 with its zone."""
+    program: str | None = None
+    camera: CameraPart = CameraPart()
+    answer: AnswerPart | None = None
+    """What the report's first screen and the terminal say."""
+    warnings: tuple[WarningPart, ...] = ()
+    """What is known to be wrong or undetermined, what is undetermined first."""
+    undetermined: dict[Literal["camera", "hand_eye"], str] = Field(default_factory=dict)
+    """Parts that the data do not determine, and why; `cell export` refuses them."""
     image_size_px: tuple[int, int] | None = None
     """Width and height."""
     distance_range_m: tuple[PositiveFloat, PositiveFloat] | None = None

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+)
 
 from calib.paper.focus_law import LAWS
 from calib.views import FloatArray
@@ -148,6 +156,11 @@ class RobotSource(_Part):
     corner_sigma_px: PositiveFloat
 
 
+def _fitted_or_none(robot: Any) -> Any:
+    """None for a robot that no fit said anything of."""
+    return robot if isinstance(robot, dict) and robot.get("source") else None
+
+
 class CrossValidationSource(_Part):
     """Whether other frames would have given the same."""
 
@@ -155,22 +168,29 @@ class CrossValidationSource(_Part):
     """How many times the stated sigmas the frames ask for."""
 
 
-class CalibrationSource(_Part):
+class PlacementSource(_Part):
+    """Where camera and board are, as far as it was determined."""
+
+    recording: str = ""
+    created: str | None = None
+    undetermined: dict[str, str] = {}
+    flange_from_camera: TransformSource | None = None
+    base_from_board: TransformSource | None = None
+    flange_from_board: TransformSource | None = None
+    base_from_camera: TransformSource | None = None
+
+
+class CalibrationSource(PlacementSource):
     """What a reader of `calibration.json` relies on."""
 
     schema_: Literal["cell.calibration/1"] = Field(alias="schema")
-    recording: str = ""
     image_size_px: tuple[PositiveInt, PositiveInt] | None = None
     distance_range_m: tuple[PositiveFloat, PositiveFloat] | None = None
     scale_factors: tuple[ScaleFactorSource, ...] = ()
     zones: ZonesSource | None = None
     focus_law: LawSource | None = None
     solutions: dict[str, SolutionSource]
-    flange_from_camera: TransformSource | None = None
-    base_from_board: TransformSource | None = None
-    flange_from_board: TransformSource | None = None
-    base_from_camera: TransformSource | None = None
-    robot: RobotSource | None = None
+    robot: Annotated[RobotSource | None, BeforeValidator(_fitted_or_none)] = None
     cross_validation: CrossValidationSource | None = None
 
     @property

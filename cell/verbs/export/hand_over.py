@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from cell.errors import InputError
@@ -11,6 +11,8 @@ from cell.verbs.export.camera import Camera
 from cell.verbs.export.focal_length import focal_lengths_px, moving_law, refusal
 from cell.verbs.export.formats import colmap, kalibr, mrcal, opencv, ros
 from cell.verbs.export.formats.json_text import json_text
+from cell.views.poses import abb, easy_handeye2, plain_text, tf, ur, urdf
+from cell.views.poses.placement import Placement, placements, refuse_undetermined
 
 _SKEW_PX = 1e-9
 
@@ -21,7 +23,18 @@ TEXTS: dict[str, Callable[[Camera], str]] = {
     "kalibr": kalibr.text,
     "colmap": colmap.text,
 }
-FORMATS = (*TEXTS, "json")
+POSES: dict[str, Callable[[Sequence[Placement]], str]] = {
+    "tf": tf.text,
+    "moveit": tf.launch_file,
+    "easy_handeye2": easy_handeye2.text,
+    "urdf": urdf.text,
+    "ur": ur.text,
+    "abb": abb.text,
+    "text": plain_text.text,
+}
+"""Formats that say where camera and board are, and nothing of the lens."""
+
+FORMATS = (*TEXTS, "json", *POSES)
 
 
 @dataclass(frozen=True)
@@ -39,6 +52,7 @@ def export_calibration(
     distance_m: float | None = None,
     solution: str | None = None,
     image_size_px: tuple[int, int] | None = None,
+    frames: Mapping[str, str] | None = None,
 ) -> Exported:
     """The calibrated camera in a tool's own format.
 
@@ -54,12 +68,18 @@ def export_calibration(
         Name of the solution; the recommended one where None.
     image_size_px:
         (width, height) for a file that does not tell.
+    frames:
+        Names of `FRAMES` in the reader's tool, for the formats of `POSES`.
 
     Raises
     ------
     InputError
-        The format cannot say this camera; the message tells what to choose.
+        The format cannot say this camera, or the calibration does not determine it; the
+        message tells what to choose.
     """
+    if tool in POSES:
+        return Exported(POSES[tool](placements(calibration, frames)), ())
+    refuse_undetermined(calibration, "camera")
     name = calibration.recommended() if solution is None else solution
     found, law = calibration.solution(name), moving_law(calibration, name)
     if tool not in FORMATS:

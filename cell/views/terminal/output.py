@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
+
+from cell.errors import InputError
+
+_kept = logging.getLogger("cell.said")
+"""What the operator was told; it goes to the log file alone, stderr has it already."""
+
+_kept.propagate = False
+_kept.addHandler(logging.NullHandler())
 
 
 def show(text: str, result: Mapping[str, Any], *, as_json: bool) -> None:
@@ -16,6 +26,25 @@ def show(text: str, result: Mapping[str, Any], *, as_json: bool) -> None:
 def say(text: str) -> None:
     """Tell the operator something that is not the result."""
     sys.stderr.write(text + "\n")
+    _kept.info(text)
+
+
+def keep_log(path: Path) -> None:
+    """Append to a file all that is said from now on, with its time.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    try:
+        handler = logging.FileHandler(path, encoding="utf-8")
+    except OSError as fault:
+        raise InputError(f"--log {path}: cannot be written: {fault.strerror}") from None
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    _kept.addHandler(handler)
+    _kept.setLevel(logging.INFO)
+    logging.getLogger().addHandler(handler)
 
 
 def say_error(text: str) -> None:

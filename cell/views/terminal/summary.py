@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from cell.views.answer_words import answer_words
+
 _NAMES = {
     "zhang_algebraic": "Zhang, algebraic",
     "zhang_mle": "Zhang, maximum likelihood",
@@ -15,22 +17,47 @@ _NAMES = {
 }
 
 
-def calibration_summary(calibration: Mapping[str, Any]) -> str:
-    """What `calibration.json` says, for people."""
+def calibration_summary(calibration: Mapping[str, Any], *, answer: bool = True) -> str:
+    """What `calibration.json` says, for people; the answer last."""
     used, rejected = calibration["frames_used"], calibration["frames_rejected"]
     lines = [f"{_count(used)} frames used, {len(rejected)} rejected"]
     law = calibration.get("focus_law")
     if law:
         values = ", ".join(f"{name} = {p['value']:.6g}" for name, p in law["parameters"].items())
         lines.append(f"focus law {law['law']}: {values}")
-    lines.append(f"{'solution':42}{'alpha px':>10}{'rms px':>9}{'camera off by mm':>18}")
+    lines.append(f"{'':52}{'rms px,':>12}{'camera against':>18}")
+    lines.append(f"{'solution':42}{'alpha px':>10}{'poses free':>12}{'robot, rms mm':>18}")
     lines += [_solution(name, found) for name, found in calibration["solutions"].items()]
     checked = calibration.get("cross_validation")
     if checked:
         lines.append(f"cross-validation: {checked['why']}")
-    elif calibration.get("robot") and "cross_validation" in calibration.get("missing", {}):
+    elif (calibration.get("robot") or {}).get("source") and "cross_validation" in calibration.get(
+        "missing", {}
+    ):
         lines.append(f"not cross-validated: {calibration['missing']['cross_validation']}")
-    return "\n".join(lines)
+    return "\n".join([*lines, answer_line(calibration)] if answer else lines)
+
+
+def answer_line(calibration: Mapping[str, Any]) -> str:
+    """For which distances the camera may be used, with what error."""
+    return f"answer: {answer_words(calibration.get('answer'))}"
+
+
+def warning_lines(calibration: Mapping[str, Any]) -> list[str]:
+    """What is known to be wrong or undetermined, a line each."""
+    return [
+        f"warning: {w['what']} ({w['where']}). {w['remedy'][:1].upper()}{w['remedy'][1:]}"
+        for w in calibration.get("warnings") or ()
+    ]
+
+
+def undetermined_words(calibration: Mapping[str, Any]) -> str | None:
+    """What the data do not determine, or None."""
+    names = {"camera": "the camera", "hand_eye": "the camera's place on the robot"}
+    parts = [names[part] for part in calibration.get("undetermined") or ()]
+    if not parts:
+        return None
+    return f"not determined: {' and '.join(parts)}; the warnings say why and what to do"
 
 
 def diagnosis_summary(diagnosis: Mapping[str, Any]) -> str:
@@ -41,6 +68,7 @@ def diagnosis_summary(diagnosis: Mapping[str, Any]) -> str:
         before, after, noise = (holdout[k] for k in ("rms_px_before", "rms_px_after", "noise_px"))
         lines.append(
             f"frames held out: {before:.3f} px before, {after:.3f} px after; noise {noise:.3f} px"
+            " (poses tied to the robot)"
         )
     lines += [f"- {effect['name']}: {effect['physics']}" for effect in diagnosis["effects"]]
     return "\n".join(lines)
@@ -57,4 +85,4 @@ def _solution(name: str, found: Mapping[str, Any] | None) -> str:
     error = found.get("camera_position_error_m") or {}
     off = f"{1e3 * error['rms']:.2f}" if error.get("rms") is not None else "-"
     rms = found["reprojection_px"]["rms"]
-    return f"{label:42}{found['alpha_px']:>10.1f}{rms:>9.3f}{off:>18}"
+    return f"{label:42}{found['alpha_px']:>10.1f}{rms:>12.3f}{off:>18}"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from calib.views import FloatArray
+from cell.views.numbers import solution_name
 from cell.views.report.data import ReportData
 from cell.views.report.figures.canvas import BLACK, GREY, style
 from cell.views.report.geometry import reference
-from cell.views.report.numbers import solution_name
 from cell.views.report.plot import Axes, Figure, legend_below, panels
 
 _NUMBERED = 20

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from calib.views import FloatArray
+from cell.views.numbers import solution_name
 from cell.views.report.data import ReportData, in_order
 from cell.views.report.figures.canvas import style
 from cell.views.report.geometry import position_error_m, reference
-from cell.views.report.numbers import solution_name
 from cell.views.report.plot import Figure, legend_below, panels
 
 _ZOOM = 5.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from cell.views.numbers import known
 from cell.views.report.data import ReportData
 from cell.views.report.figures.canvas import BLACK, BLUE, VERMILLION
-from cell.views.report.numbers import known
 from cell.views.report.plot import Figure, panels
 
 _SHOWN = 8

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from calib.views import FloatArray, Views
+from cell.views.numbers import solution_name
 from cell.views.report.data import ReportData
 from cell.views.report.figures.canvas import BLACK, BLUE, VERMILLION
-from cell.views.report.numbers import solution_name
 from cell.views.report.plot import Axes, Figure, panels
 
 _COLUMNS = 14

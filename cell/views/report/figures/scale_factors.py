@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from calib.views import FloatArray
+from cell.views.numbers import solution_name
 from cell.views.report.data import ReportData
 from cell.views.report.figures.canvas import BLACK, GREEN, GREY, style
 from cell.views.report.geometry import best_poses, distance_m
-from cell.views.report.numbers import solution_name
 from cell.views.report.plot import Axes, Figure, legend_below, panels
 
 

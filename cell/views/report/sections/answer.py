@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from cell.views.answer_words import answer_words
+from cell.views.numbers import UNKNOWN, known, millimetres, number, solution_name
 from cell.views.report import html
+from cell.views.report.answer_values import answer_of, shared_by_distance
 from cell.views.report.data import ReportData
 from cell.views.report.figures import workpiece
-from cell.views.report.figures.workpiece import WorkpieceError, by_distance, of_solution
-from cell.views.report.numbers import UNKNOWN, known, millimetres, number, solution_name
 from cell.views.report.sections.drawing import drawing
+from cell.views.report.sections.take_away import take_away
 from cell.views.report.sections.trust import sentences
-from cell.views.report.sections.uncertainty import calibration_sigma_m
+from cell.views.report.workpiece_error import WorkpieceError, by_distance, of_solution
 
-_SIGMAS = 2.0
+_FIRST = 3
 
 _VERDICTS = {
     "consistent": ("Consistent", "nothing is missing beyond noise", "good"),
@@ -28,19 +31,22 @@ _VERDICTS = {
 def answer(data: ReportData) -> str:
     """Banner, title, the answer in one sentence, its cards, and the drawing that shows it."""
     best = None if data.recommended is None else of_solution(data, data.recommended)
+    found = answer_of(data) or {}
     picture = drawing(
         lambda: workpiece.draw(data),
         "Error at the work piece: how far from its true place the arm would meet a part of the "
         "board's size that was located by one picture. Each mark is a frame, lines are the RMS "
-        "over a range of distances.",
-        "The error at the work piece is not known: no flange pose was logged, so there is "
-        "nothing to hold the camera's poses against.",
+        "over a range of distances; dashed what the calibration as a whole may be off by (two "
+        "sigma), dotted the answer, which holds both.",
+        f"The error at the work piece is not known: {_no_error(found) or 'nothing tells it'}.",
     )
     return (
         f'<section id="answer">{_banner(data)}<h1>{html.text(_title(data))}</h1>'
-        f"{html.paragraph(_sentence(data, best), 'lead')}"
-        f'<div class="cards">{_cards(data, best)}</div>'
-        f'<div class="pair"><div>{picture}</div><div>{_by_distance(best)}'
+        f"{html.paragraph(_sentence(data), 'lead')}"
+        f"{_warnings(data)}"
+        f'<div class="cards">{_cards(data)}</div>'
+        f"{take_away(data)}"
+        f'<div class="pair"><div>{picture}</div><div>{_by_distance(data, best)}'
         f"<h3>What can be trusted</h3>{html.bullets(sentences(data))}</div></div></section>"
     )
 
@@ -51,31 +57,6 @@ def verdict_words(data: ReportData) -> tuple[str, str, str]:
     if verdict in _VERDICTS:
         return _VERDICTS[verdict]
     return "Not diagnosed", "not searched for missing physics: run cell diagnose", ""
-
-
-def usable_m(data: ReportData) -> tuple[float, float] | None:
-    """The range of distances the calibration vouches for, metres.
-
-    Where the scale factor's dependence on distance is modelled, that is the range seen; where it
-    is taken as constant, zone 2. Without flange poses, what the pictures alone say.
-    """
-    calibration = data.calibration or {}
-    seen = [f["distance_m"] for f in calibration.get("scale_factors") or []]
-    best = None if data.recommended is None else of_solution(data, data.recommended)
-    if best is not None:
-        seen += [float(best.distance_m.min()), float(best.distance_m.max())]
-    if not seen:
-        by_pictures = calibration.get("distance_range_m")
-        return None if by_pictures is None else (by_pictures[0], by_pictures[1])
-    low, high = min(seen), max(seen)
-    zones: dict[str, Any] = calibration.get("zones") or {}
-    law = (calibration.get("focus_law") or {}).get("law")
-    if law == "constant":
-        if not zones.get("near_is_bound"):
-            low = max(low, zones.get("near_limit_m") or low)
-        if not zones.get("far_is_bound"):
-            high = min(high, zones.get("far_limit_m") or high)
-    return low, high
 
 
 def _banner(data: ReportData) -> str:
@@ -96,44 +77,25 @@ def _title(data: ReportData) -> str:
     return f"{camera}{where}" + (f" · {name}" if name else "")
 
 
-def _sentence(data: ReportData, best: WorkpieceError | None) -> str:
+def _sentence(data: ReportData) -> str:
     if data.calibration is None:
         return f"No calibration was made here. Diagnosis: {verdict_words(data)[1]}."
-    usable = usable_m(data)
-    if usable is None:
-        return (
-            "The camera was calibrated, but neither its distances nor its error at the work "
-            "piece are known from this recording."
-        )
-    span = f"from {usable[0]:.2f} to {usable[1]:.2f} m"
-    if best is None:
-        return (
-            f"The calibration covers distances {span}. Its error at the work piece is not known, "
-            "because no flange pose was logged."
-        )
-    shared = calibration_sigma_m(data)
-    frames = f"95 % of {_frames(data, best)} stay below"
-    if shared is None:
-        why = f"{frames} that, measured against {best.against}."
-    else:
-        why = (
-            f"{frames} {millimetres(best.p95_m)} against {best.against}, and the calibration as a "
-            f"whole may be off by {millimetres(_SIGMAS * shared)} (two sigma)."
-        )
-    allows = millimetres(allowance_m(data, best))
-    return f"Use this camera {span}, for work that allows {allows} at the work piece: {why}" + (
-        _caution(data)
+    return answer_words(answer_of(data)) + _caution(data)
+
+
+def _warnings(data: ReportData) -> str:
+    """What is known to be wrong or undetermined: the first three, the others one step away."""
+    found = (data.calibration or {}).get("warnings") or []
+    items = [
+        f"{w['what']} ({w['where']}). {w['remedy'][:1].upper()}{w['remedy'][1:]}" for w in found
+    ]
+    if not items:
+        return ""
+    more = html.fold(f"{len(items) - _FIRST} more", html.bullets(items[_FIRST:]))
+    return (
+        f'<div class="warnings" role="alert"><h3>Known to be wrong or not determined</h3>'
+        f"{html.bullets(items[:_FIRST])}{more if len(items) > _FIRST else ''}</div>"
     )
-
-
-def allowance_m(data: ReportData, best: WorkpieceError) -> float:
-    """What the work piece must allow: from picture to picture, and of all pictures together."""
-    return float(np.hypot(best.p95_m, _SIGMAS * (calibration_sigma_m(data) or 0.0)))
-
-
-def _frames(data: ReportData, best: WorkpieceError) -> str:
-    known_in, all_of = len(best.error_m), len(data.views)
-    return f"{known_in} frames" if known_in == all_of else f"{known_in} of {all_of} frames"
 
 
 def _caution(data: ReportData) -> str:
@@ -142,19 +104,16 @@ def _caution(data: ReportData) -> str:
     return " With care: the diagnosis found something that it cannot name (see below)."
 
 
-def _cards(data: ReportData, best: WorkpieceError | None) -> str:
-    usable, (verdict, meaning, css) = usable_m(data), verdict_words(data)
+def _cards(data: ReportData) -> str:
+    found, (verdict, meaning, css) = answer_of(data) or {}, verdict_words(data)
+    usable, error = found.get("usable_distances_m"), found.get("error_at_work_piece_m")
     return "".join(
         (
-            html.card(
-                "Distances",
-                _range(usable),
-                _zone_note(data),
-            ),
+            html.card("Distances", _range(usable), _zone_note(data)),
             html.card(
                 "Error at the work piece",
-                UNKNOWN if best is None else millimetres(allowance_m(data, best)),
-                "no flange pose was logged" if best is None else _error_note(data, best),
+                UNKNOWN if error is None else millimetres(error["p95"]),
+                _no_error(found) if error is None else _error_note(error),
             ),
             _reprojection_card(data),
             html.card("Diagnosis", verdict, meaning, css),
@@ -162,15 +121,19 @@ def _cards(data: ReportData, best: WorkpieceError | None) -> str:
     )
 
 
-def _error_note(data: ReportData, best: WorkpieceError) -> str:
-    shared = calibration_sigma_m(data)
-    each = f"picture by picture {millimetres(best.rms_m)} RMS against {best.against}"
+def _no_error(found: Mapping[str, Any]) -> str:
+    return next((w for w in found.get("limits") or () if not w.startswith("outside")), "")
+
+
+def _error_note(error: Mapping[str, Any]) -> str:
+    each = f"picture by picture {millimetres(error['each_picture_rms'])} RMS"
+    shared = error.get("calibration_sigma")
     if shared is None:
-        return each
-    return f"at 95 %; {each}, all together {millimetres(shared)} (one sigma)"
+        return f"at 95 %; {each} against {error['against']}"
+    return f"at 95 %; {each}, the calibration as a whole {millimetres(shared)} (one sigma)"
 
 
-def _range(usable: tuple[float, float] | None) -> str:
+def _range(usable: Sequence[float] | None) -> str:
     return UNKNOWN if usable is None else f"{usable[0]:.2f} – {usable[1]:.2f} m"
 
 
@@ -188,14 +151,17 @@ def _reprojection_card(data: ReportData) -> str:
     rms = data.solutions.get(name or "", {}).get("reprojection_px", {}).get("rms")
     note = f"RMS, {solution_name(name)}" if name else "no calibration"
     text = number(rms, "px", 2) if known(rms) else UNKNOWN
-    return html.card("Reprojection", text, f"{note}; says nothing about the error in mm")
+    words = f"{note}; poses free, so it says nothing about the error in mm"
+    return html.card("Reprojection", text, words)
 
 
-def _by_distance(best: WorkpieceError | None) -> str:
+def _by_distance(data: ReportData, best: WorkpieceError | None) -> str:
     if best is None:
         return ""
-    rows = [
-        (f"{low:.2f} – {high:.2f} m", frames, millimetres(rms))
-        for low, high, frames, rms in by_distance(best)
-    ]
-    return html.table(("distance", "frames", "error at the work piece, RMS"), rows)
+    shared = shared_by_distance(data.calibration or {})
+    rows = []
+    for low, high, frames, rms in by_distance(best):
+        whole = None if shared is None else float(np.interp((low + high) / 2, *shared))
+        rows.append((f"{low:.2f} – {high:.2f} m", frames, millimetres(rms), millimetres(whole)))
+    head = ("distance", "frames", "picture by picture, RMS", "calibration as a whole, one sigma")
+    return html.table(head, rows, "Error at the work piece, in its two parts")

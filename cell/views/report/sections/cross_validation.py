@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from cell.views.numbers import number, probability
 from cell.views.report import html
 from cell.views.report.data import ReportData
-from cell.views.report.numbers import number, probability
 
 _QUANTITIES = {
     "alpha_px": "focal length α",
@@ -31,7 +31,7 @@ def cross_validation_sentences(data: ReportData) -> Iterator[str]:
     reason = (calibration.get("missing") or {}).get("cross_validation")
     if found:
         yield found["why"]
-    elif reason and calibration.get("robot"):
+    elif reason and (calibration.get("robot") or {}).get("source"):
         yield f"Not cross-validated: {reason}."
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from cell.views.numbers import solution_name
 from cell.views.report import html
 from cell.views.report.data import ReportData
 from cell.views.report.figures import residuals
-from cell.views.report.numbers import solution_name
 from cell.views.report.sections.drawing import drawing
 
 

@@ -7,11 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cell.views.report import html
-from cell.views.report.data import ReportData
-from cell.views.report.evidence import picture_of, remedy_of
-from cell.views.report.figures import proof
-from cell.views.report.numbers import (
+from cell.views.numbers import (
     UNKNOWN,
     known,
     millimetres,
@@ -19,6 +15,10 @@ from cell.views.report.numbers import (
     parameters,
     probability,
 )
+from cell.views.report import html
+from cell.views.report.data import ReportData
+from cell.views.report.evidence import picture_of, remedy_of
+from cell.views.report.figures import proof
 from cell.views.report.sections.answer import verdict_words
 from cell.views.report.sections.drawing import drawing
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from calib.views import FloatArray
+from cell.views.numbers import number
 from cell.views.report import html
 from cell.views.report.data import Image, ReportData
-from cell.views.report.numbers import number
 
 _WIDTH_PX = 220
 _MOST = 240

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from cell.views.numbers import UNKNOWN, known, measured, number, parameters, plus_minus
 from cell.views.report import html
 from cell.views.report.data import ReportData
 from cell.views.report.figures import scale_factors
-from cell.views.report.numbers import UNKNOWN, known, measured, number, parameters, plus_minus
 from cell.views.report.sections.drawing import drawing
 
 _FORMULAS = {

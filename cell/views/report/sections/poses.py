@@ -6,10 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from cell.views.report import html
-from cell.views.report.data import ReportData
-from cell.views.report.figures import camera_positions, position_errors
-from cell.views.report.numbers import (
+from cell.views.numbers import (
     UNKNOWN,
     known,
     measured,
@@ -17,6 +14,9 @@ from cell.views.report.numbers import (
     number,
     solution_name,
 )
+from cell.views.report import html
+from cell.views.report.data import ReportData
+from cell.views.report.figures import camera_positions, position_errors
 from cell.views.report.sections.drawing import drawing
 
 _NO_ROBOT = "No flange pose was logged, so the camera's true positions are not known."
@@ -76,8 +76,8 @@ def _agrees(solution: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _noise(data: ReportData) -> str:
-    robot = (data.calibration or {}).get("robot")
-    if not robot:
+    robot = (data.calibration or {}).get("robot") or {}
+    if not robot.get("source"):
         return ""
     outliers = ", ".join(str(frame) for frame in robot.get("outliers") or []) or "none"
     words = (

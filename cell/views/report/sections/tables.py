@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from calib.calibration.joint_lens import FURTHER_NAMES
+from cell.views.numbers import UNKNOWN, number, plus_minus, solution_name, symbol
 from cell.views.report import html
 from cell.views.report.data import ReportData
-from cell.views.report.numbers import UNKNOWN, number, plus_minus, solution_name, symbol
 
 _PARAMETERS = ("alpha_px", "beta_px", "u0_px", "v0_px", "skew_px", "k1", "k2")
 _WHERE_FREED = FURTHER_NAMES

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from cell.views.numbers import known, measured, millimetres, number, solution_name
 from cell.views.report.data import ReportData
-from cell.views.report.figures.workpiece import corrected, of_solution
 from cell.views.report.geometry import workpiece_error_m
-from cell.views.report.numbers import known, measured, millimetres, number, solution_name
 from cell.views.report.sections.cross_validation import cross_validation_sentences
 from cell.views.report.sections.uncertainty import uncertainty_sentences
+from cell.views.report.workpiece_error import corrected, of_solution
 
 _MANY_TIMES = 3.0
 

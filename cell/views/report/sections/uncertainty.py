@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from calib.calibration.verdict_messages import listed
+from cell.views.numbers import millimetres, number
 from cell.views.report import html
 from cell.views.report.data import ReportData
-from cell.views.report.numbers import millimetres, number
 from cell.views.report.sections.cross_validation import cross_validation
 
 
@@ -42,15 +42,6 @@ def uncertainty_sentences(data: ReportData) -> Iterator[str]:
         more = weak["separate_with"]
         helps = f"; {more}." if more.startswith("none") else f": record {more} as well."
         yield words + helps
-
-
-def calibration_sigma_m(data: ReportData) -> float | None:
-    """One sigma at the work piece that all pictures share: image's mean, worst distance."""
-    found = (data.calibration or {}).get("uncertainty")
-    if not found:
-        return None
-    metres = np.linalg.norm(found["workpiece_sigma_m"], axis=2)
-    return max(_rms(at) for at in metres)
 
 
 _FRAMES = {
@@ -123,7 +114,7 @@ def _not_separable(calibration: Mapping[str, Any]) -> str:
     if found is None:
         return html.missing("Whether the views tell everything apart was not worked out.")
     if not found:
-        if not calibration.get("robot"):
+        if not (calibration.get("robot") or {}).get("source"):
             return html.missing("Without a joint fit nothing is said of what goes together.")
         return html.paragraph("The views tell all fitted quantities apart.")
     head = ("hardly told apart", "times worse than each alone", "record as well",

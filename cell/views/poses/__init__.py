@@ -1,0 +1,1 @@
+"""One file per way that robots and programs are handed a rigid transform."""
