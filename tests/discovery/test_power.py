@@ -77,7 +77,7 @@ def test_mirror_images_are_told_with_the_experiment_that_parts_them():
 
 
 def test_what_does_not_move_cannot_show_a_clock():
-    assert set(POWER.unseen) == {"pose_time_lag", "rolling_shutter"}
+    assert set(POWER.unseen) == {"exposure_bias", "pose_time_lag", "rolling_shutter"}
     moving = plan_power(plain_cell(), log(30, moving=True), NOISE)
     assert {"pose_time_lag", "rolling_shutter"} <= {e.effect.name for e in moving.effects}
 

@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from calib.bodies import arm_bodies
 from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue
 from calib.chain.kinematics import ArmKinematics
-from calib.chain.model import CellModel, kinematics_of, walk
+from calib.chain.model import kinematics_of, walk
 from calib.chain.optics import COLUMN
 from calib.discovery.design.choose import Design, contest, t_optimal
 from calib.discovery.design.power import DECISIVE
 from calib.discovery.diagnosis import Ambiguity, Diagnosis
 from calib.views import FloatArray, Views
 from cell.devices.planned_camera import PlannedCamera
+from cell.sequencer.bodies import carried_bodies
 from cell.sequencer.guard import Guard
 from cell.storage.files.cell_file import CellFile
 from cell.storage.files.plan_file import SCHEMA as PLAN_SCHEMA
@@ -93,16 +95,21 @@ def _cell(found: Diagnosis, recording: Recording, kinematics: ArmKinematics) -> 
         "distances_m": [round(float(v), 4) for v in (distance.min(), distance.max())],
         "alpha_px": round(float(found.twin.model.optics[COLUMN["alpha_px"]]), 2),
     }
-    content["workspace"] = _walls(found.twin.model, views, kinematics)
+    cell = CellFile.model_validate(content)
+    content["workspace"] = _walls(cell, views, kinematics)
     return CellFile.model_validate(content)
 
 
-def _walls(model: CellModel, views: Views, kinematics: ArmKinematics) -> dict[str, Any]:
-    """The box that the arm's links and what it carries kept to, and a little room."""
-    frames = kinematics.frames(views.joints_rad)[:, 2:]
-    tool = frames[:, -1:] @ model.flange_from_mounted
-    points = np.concatenate([frames, tool], axis=1)[..., :3, 3].reshape(-1, 3)
-    low, high = points.min(axis=0), points.max(axis=0)
+def _walls(cell: CellFile, views: Views, arm: ArmKinematics) -> dict[str, Any]:
+    """The box that the arm's body and what it carries kept to, and a little room."""
+    frames = arm.frames(views.joints_rad)
+    outlines = []
+    for body in (*arm_bodies(arm)[0], *carried_bodies(cell, len(arm.dh))):
+        for shape in body.shapes if body.link > 1 else ():
+            turned = np.einsum("nij,pj->npi", frames[:, body.link, :3, :3], shape.points_m)
+            points = (turned + frames[:, body.link, None, :3, 3]).reshape(-1, 3)
+            outlines += [points.min(axis=0) - shape.radius_m, points.max(axis=0) + shape.radius_m]
+    low, high = np.min(outlines, axis=0), np.max(outlines, axis=0)
     low = low - np.array([_ROOM_M, _ROOM_M, 1e-3])
     high = high + _ROOM_M
     return {
