@@ -25,7 +25,7 @@ class Oracle:
     @property
     def detectable(self) -> bool:
         """Whether the truth pays for its size by the Bayesian criterion and a margin of eight."""
-        return self.gain > 8.0 + np.log(self.numbers)
+        return bool(self.gain > 8.0 + np.log(self.numbers))
 
 
 def consult(case: Concealed) -> Oracle:
