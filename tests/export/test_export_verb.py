@@ -148,7 +148,7 @@ def test_an_older_file_without_the_image_s_size_is_told_apart(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("{", "is not valid"),
+        ("{", "is no JSON"),
         ('{"schema": "cell.plan/1"}', "is this the right file"),
         ('{"schema": "cell.calibration/1", "solutions": {"joint_ml": {"alpha_px": -1}}}',
          "alpha_px: Input should be greater than 0"),

@@ -110,8 +110,10 @@ def _walls(cell: CellFile, views: Views, arm: ArmKinematics) -> dict[str, Any]:
             points = (turned + frames[:, body.link, None, :3, 3]).reshape(-1, 3)
             outlines += [points.min(axis=0) - shape.radius_m, points.max(axis=0) + shape.radius_m]
     low, high = np.min(outlines, axis=0), np.max(outlines, axis=0)
-    low = low - np.array([_ROOM_M, _ROOM_M, 1e-3])
-    high = high + _ROOM_M
+    # the guard keeps the clearance free before a wall, too
+    room_m = _ROOM_M + cell.clearance_m
+    low = low - np.array([room_m, room_m, 1e-3 + cell.clearance_m])
+    high = high + room_m
     return {
         "name": "where the arm has been",
         "low_m": [round(float(v), 4) for v in low],

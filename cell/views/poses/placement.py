@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cell.errors import InputError
 from cell.storage.files.calibration_source import PlacementSource, TransformSource
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 FRAMES: dict[str, str] = {
     "base": "base",
@@ -80,6 +82,8 @@ class Placement:
     @property
     def rotation(self) -> Rotation:
         """Of the child in the parent."""
+        from scipy.spatial.transform import Rotation
+
         return Rotation.from_quat(self.transform.q_xyzw)
 
     @property
