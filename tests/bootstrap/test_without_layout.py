@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cell.errors import InputError
+from cell.errors import BadAnswer, InputError
 from cell.sequencer.states import Finish
 from cell.storage.files.cell_file import CellFile
 from cell.storage.files.writing import yaml_text
@@ -24,13 +24,8 @@ def without_layout(cell: CellFile, pixel_um: float) -> tuple[CellFile, tuple[flo
     return cell.model_copy(update={"layout": None, "camera": camera}), cell.layout.home_deg
 
 
-@pytest.mark.parametrize(
-    ("cell", "pixel_um"), [(ur3(), 3.8), (eye_to_hand(), 4.7)], ids=["in_hand", "to_hand"]
-)
-def test_three_shifts_take_the_place_of_a_layout(
-    cell: CellFile, pixel_um: float, tmp_path: Path
-) -> None:
-    unknown, start_deg = without_layout(cell, pixel_um)
+def test_three_shifts_take_the_place_of_a_layout(tmp_path: Path) -> None:
+    unknown, start_deg = without_layout(ur3(), 3.8)
     trial = run_trial(unknown, tmp_path / "trial", start_deg)
     assert trial.error is None
     assert trial.violations() == []
@@ -41,6 +36,13 @@ def test_three_shifts_take_the_place_of_a_layout(
     assert whole == views > 20
     assert trial.found is not None
     assert trial.found.layout.home_deg == pytest.approx(start_deg, abs=1e-3)
+
+
+def test_a_board_of_unknown_place_on_the_flange_may_want_more_room(tmp_path: Path) -> None:
+    """Neither board nor camera is known: what may be there bars the way, and that is said."""
+    unknown, start_deg = without_layout(eye_to_hand(), 4.7)
+    with pytest.raises(BadAnswer, match="what is at the flange would strike keep-out box"):
+        run_trial(unknown, tmp_path / "trial", start_deg)
 
 
 def written(cell: CellFile, folder: Path) -> Path:

@@ -12,6 +12,7 @@ from calib.views import FloatArray
 from cell.devices.factory import real_devices, simulated_devices
 from cell.devices.planned_camera import PlannedCamera
 from cell.errors import InputError
+from cell.sequencer.guard import Guard
 from cell.sequencer.sequencer import Devices
 from cell.sequencer.session import record_plan
 from cell.sequencer.states import Finish, RunResult
@@ -114,7 +115,8 @@ class Bootstrap:
         InputError, SafetyError, DeviceError
             Nothing was moved.
         """
-        start_rad = where_it_stands(devices)
+        named = Guard(self.cell, SPEED_M_S, np.radians(JOINT_SPEED_DEG_S)).kinematics
+        start_rad = where_it_stands(devices, named)
         guard = NearGuard.around(self.cell, start_rad, self.told)
         guard.check_surroundings()
         guide = self._guide(guard)
