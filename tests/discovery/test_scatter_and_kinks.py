@@ -67,14 +67,17 @@ def kinked() -> Views:
     return replace(made, base_from_flange=LOG.base_from_flange[made.frame])
 
 
-def test_a_kink_is_carried_by_one_finer_curve_and_nothing_is_named_for_what_a_smooth_one_leaves():
+def test_a_kink_is_carried_by_one_law_and_nothing_is_named_for_what_a_smooth_one_leaves():
     found = diagnose(kinked())
     assert found.verdict == "unexplained"
     assert found.effects == ()
     assert found.unexplained is not None
     assert (found.unexplained.site, found.unexplained.covariate) == ("joint_3", "joint_3")
-    (curve,) = found.twin.model.effects
-    assert curve.as_mapping()["fine"] == 1.0
+    (law,) = found.twin.model.effects
+    assert law.effect.law == "hinge:joint_3.joint_3/joint_3"
+    assert law.as_mapping()["at"] == pytest.approx(1.2, abs=0.05)
+    assert found.proof.rms_px_before > 3.0
+    assert found.proof.rms_px_after < 1.2 * found.proof.noise_px
 
 
 def searched(views: Views) -> Search:

@@ -14,6 +14,8 @@ from cell.devices.simulated_cell import home_of
 from cell.errors import InputError
 from cell.sequencer.guard import Guard
 from cell.storage.files.plan_file import Plan
+from cell.verbs.plan.reach import Candidate
+from cell.verbs.plan.tour import shortest_tour
 from cell.verbs.verify.change import wide
 from cell.verbs.verify.judge import FRAMES_NEEDED
 from cell.verbs.verify.old_cell import OldCell
@@ -35,9 +37,33 @@ def shortened(old: OldCell, plan: Plan, count: int) -> Plan:
         raise InputError(f"--views {count}: at least {FRAMES_NEEDED} are needed")
     views = plan.file.views
     if count < len(views):
-        views = tuple(views[k] for k in choose_views(old, _log(old, plan), count))
+        views = tuple(views[k] for k in _passable(old, plan, count))
     # a run that ended early would lack the views that tell
     return replace(plan, file=plan.file.model_copy(update={"views": views, "until": None}))
+
+
+def _passable(old: OldCell, plan: Plan, count: int) -> list[int]:
+    """Places of the most telling views, in an order in which every move is allowed.
+
+    A view that no allowed move leads to from the others is done without.
+    """
+    log, guard, home = _log(old, plan), Guard.of(plan), home_of(plan)
+    joints = [home]
+    for k in range(len(plan.file.views)):
+        joints.append(guard.joints_of(plan, k, joints[-1]))
+    left = np.arange(len(log))
+    while True:
+        chosen = left[choose_views(old, log.take(left), count)]
+        stops = {
+            k: Candidate(
+                plan.file.views[k].station or "", 0.0, log.base_from_flange[k], joints[k + 1]
+            )
+            for k in chosen.tolist()
+        }
+        tour, barred = shortest_tour(list(stops.values()), home, guard)
+        if not barred:
+            return [k for stop in tour for k, candidate in stops.items() if candidate is stop]
+        left = np.array([k for k in left.tolist() if stops.get(k) not in barred])
 
 
 def choose_views(old: OldCell, log: Views, count: int) -> NDArray[np.int64]:
