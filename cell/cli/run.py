@@ -14,7 +14,10 @@ from cell.storage.files.results import new_folder
 from cell.views.page.address import DEFAULT
 from cell.views.terminal.output import say, say_error, show
 
-DEFAULT_PLAN = Path(__file__).parents[1] / "storage" / "defaults" / "irb140-eosens.plan.yaml"
+DEFAULT_PLAN = (
+    Path(__file__).parents[1] / "storage" / "defaults" / "irb140-eosens.plan.yaml"
+).resolve()
+"""In a checkout a link to `configs/`, beside whose file the cell stands as well."""
 
 
 def run(

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from cell.cli.app import main
+from cell.cli.run import DEFAULT_PLAN
+from cell.storage.files.plan_file import read_plan
 from cell.storage.recording import read_recording
 from tests.cell.plans import CELL, PLAN
 from tests.cell.recordings import HEADER, corner_rows, frame_line
@@ -248,3 +250,7 @@ def test_an_image_that_is_not_an_image(cell: Cell, recording_folder: Callable[..
     said = cell("calibrate", folder)
     assert said.status == 1
     assert "a.png: is not an image" in said.err
+
+
+def test_the_plan_that_a_dry_run_has_by_itself_names_a_cell_that_is_there() -> None:
+    assert read_plan(DEFAULT_PLAN).cell.robot.model == "irb140"
