@@ -6,9 +6,7 @@ the cell runs in a process of its own and knows nothing but their addresses.
 
 from __future__ import annotations
 
-import itertools
 import json
-import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -27,6 +25,7 @@ from sim.cell import SimulatedCell
 from sim.clock import SimClock, WallClock
 from sim.peers.abb import ABBController
 from sim.peers.gige import GigEPeer
+from sim.peers.loopback import own_address
 from sim.peers.robotiq import RobotiqPeer
 from sim.peers.ur import URController
 
@@ -34,7 +33,6 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 VIEWS = 60
 _WIDTH_PX = 320
 _SWAY_DEG = np.array([1.0, 1.0, -1.0, 1.5, 1.5, 10.0])
-_numbers = itertools.count(2)
 
 
 @dataclass
@@ -65,7 +63,7 @@ class Stand:
 @contextmanager
 def ur_gige(folder: Path) -> Iterator[Stand]:
     """A UR3 and a GigE Vision camera."""
-    arm_at, camera_at = _address(), _address()
+    arm_at, camera_at = own_address(), own_address()
     robot = {"driver": "ur", "address": arm_at}
     camera = {"driver": "gige", "model": "gige_camera", "address": camera_at}
     plan = _plan(folder, "ur3-robotiq", robot, camera)
@@ -86,7 +84,7 @@ def ur_gige(folder: Path) -> Iterator[Stand]:
 @contextmanager
 def abb_robotiq(folder: Path) -> Iterator[Stand]:
     """An IRB 140 and a Robotiq wrist camera."""
-    arm_at, camera_at = _address(), f"{_address()}:4242"
+    arm_at, camera_at = own_address(), f"{own_address()}:4242"
     robot = {"driver": "abb", "address": f"{arm_at}:8610", "factory_password": True}
     camera = {"driver": "robotiq", "model": "robotiq_wrist", "address": camera_at}
     plan = _plan(folder, "irb140-eosens", robot, camera)
@@ -99,12 +97,6 @@ def abb_robotiq(folder: Path) -> Iterator[Stand]:
 
 
 STANDS = {"ur+gige": ur_gige, "abb+robotiq": abb_robotiq}
-
-
-def _address() -> str:
-    """A loopback address that no other process and no other stand has."""
-    pid = os.getpid()
-    return f"127.{128 + (pid >> 14) % 64}.{(pid >> 7) & 127}.{(pid & 127) + next(_numbers)}"
 
 
 def _plan(folder: Path, name: str, robot: dict[str, Any], camera: dict[str, Any]) -> Plan:

@@ -8,7 +8,6 @@ hold up the devices. They go when the context is left, and when this process die
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -23,6 +22,7 @@ from sim.build import build
 from sim.camera import SimCamera
 from sim.cell import SimulatedCell
 from sim.clock import SimClock, WallClock
+from sim.peers.loopback import own_address
 
 ArmWire = Literal["ur", "abb"]
 CameraWire = Literal["gige", "robotiq"]
@@ -54,7 +54,7 @@ def peers(cell: SimulatedCell, arm: ArmWire, camera: CameraWire) -> Iterator[Wir
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(
-        target=_serve, args=(there, cell, arm, camera, _own_address()), name="peers", daemon=True
+        target=_serve, args=(there, cell, arm, camera, own_address()), name="peers", daemon=True
     )
     process.start()
     there.close()
@@ -66,12 +66,6 @@ def peers(cell: SimulatedCell, arm: ArmWire, camera: CameraWire) -> Iterator[Wir
         if process.is_alive():
             process.kill()
             process.join()
-
-
-def _own_address() -> str:
-    """A loopback address that no other process has; 127.0.0.x is left to others."""
-    pid = os.getpid()
-    return f"127.{64 + (pid >> 14) % 128}.{(pid >> 7) & 127}.{1 + (pid & 127)}"
 
 
 def _told(link: Connection) -> Wires:

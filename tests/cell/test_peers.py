@@ -27,6 +27,7 @@ from drivers.aravis import AravisCamera
 from drivers.errors import DeviceRefused
 from drivers.robotiq import RobotiqCamera
 from drivers.ur import URArm
+from sim.peers.loopback import own_address
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SMALL = {"width: 4096": "width: 1024", "height: 3072": "height: 768", "pixel_size_um: 5.625": ""}
@@ -108,7 +109,8 @@ def test_the_peers_end_with_the_run_that_fails(tmp_path: Path) -> None:
 
 def test_addresses_that_are_taken_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = short_plan(tmp_path, "ur3-robotiq", 1, "robotiq_wrist")
-    address = cell.devices.peers._own_address()
+    address = own_address()
+    monkeypatch.setattr(cell.devices.peers, "own_address", lambda: address)
     monkeypatch.setattr(cell.devices.peers, "_compile", lambda cell: None)
     with (
         socket.create_server((address, 30001)),

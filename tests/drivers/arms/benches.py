@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import os
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -23,11 +21,11 @@ from drivers.ur import URArm, URSettings
 from sim.arm import SimArm
 from sim.clock import WallClock
 from sim.peers.abb import ABBController
+from sim.peers.loopback import own_address
 from sim.peers.ur import URController
 
 UR_HOME = (0.1, -1.4, 1.6, -1.7, -1.5, 0.2)
 UR_FAR = tuple(angle + 0.6 for angle in UR_HOME)
-_numbers = itertools.count(2)
 
 PATIENT_UR: dict[str, Any] = {"silence_s": 1.5, "watchdog_hz": 0.5, "start_timeout_s": 30.0}
 PATIENT_ABB: dict[str, Any] = {
@@ -64,12 +62,6 @@ class Bench:
 
     def truly_moving(self) -> bool:
         return truly_moving(self.sim)
-
-
-def own_address() -> str:
-    """A loopback address that no other bench of any test process has."""
-    process = os.getpid() % 50_000
-    return f"127.{process // 250 + 10}.{process % 250}.{next(_numbers)}"
 
 
 def simulated(model: str, home: tuple[float, ...]) -> SimArm:

@@ -6,7 +6,7 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from benches import ABB_HOME, own_address, simulated, slowly, until, wait_steady
+from benches import ABB_HOME, simulated, slowly, until, wait_steady
 
 from cell.devices.abb_settings import abb_settings
 from cell.errors import InputError
@@ -17,6 +17,7 @@ from drivers.abb.transport import LARGEST_ANSWER_BYTES, certificate_of, resolved
 from drivers.errors import DeviceError, DeviceRefused
 from sim.peers.abb import ABBController
 from sim.peers.abb.answers import Answer
+from sim.peers.loopback import own_address
 
 SECRET = "open-sesame-4711"
 

@@ -7,7 +7,7 @@ from contextlib import closing, suppress
 import numpy as np
 import pytest
 from ABBRobotEGM._egm_protobuf import egm_pb2
-from benches import ABB_HOME, free_udp_port, own_address, until
+from benches import ABB_HOME, free_udp_port, until
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
@@ -16,6 +16,7 @@ from drivers.abb import egm
 from drivers.abb.egm import EgmReader
 from drivers.abb.egm_message import EgmDecoder, NotBelieved
 from drivers.abb.settings import IRB140_LIMITS_RAD
+from sim.peers.loopback import own_address
 
 TURN = (0.5, 0.5, -0.5, 0.5)
 

@@ -10,7 +10,6 @@ from benches import (
     UR_HOME,
     best_of_three,
     halted_s,
-    own_address,
     quickly,
     stays,
     truly_moving,
@@ -28,6 +27,7 @@ from drivers.ur.robot_api import RobotApi
 from drivers.ur.which_panel import panel_of
 from sim.peers.controller_faults import Stops
 from sim.peers.listener import Listener
+from sim.peers.loopback import own_address
 
 PATIENT = {"silence_s": 1.5, "watchdog_hz": 0.5, "start_timeout_s": 10.0}
 

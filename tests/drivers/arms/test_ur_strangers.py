@@ -7,7 +7,7 @@ import time
 from contextlib import contextmanager, suppress
 
 import pytest
-from benches import own_address, unreachable, until, ur_moving, ur_peer
+from benches import unreachable, until, ur_moving, ur_peer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,6 +20,7 @@ from drivers.ur.reader import OUTPUTS, RtdeReader
 from drivers.ur.stop_paths import StopPaths
 from drivers.ur.wire import RTDE_PORT, Frame, Recipe, encode
 from sim.peers.listener import Listener
+from sim.peers.loopback import own_address
 
 TYPES = ["DOUBLE"] + ["VECTOR6D"] * 5 + ["UINT32", "INT32", "UINT32"]
 A_WHILE_S = 20.0

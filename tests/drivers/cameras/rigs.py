@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
@@ -26,18 +25,12 @@ from sim.cell import SimulatedCell
 from sim.clock import WallClock
 from sim.peers.callable_camera import CallableCamera
 from sim.peers.gige import GigEPeer
+from sim.peers.loopback import own_address
 from sim.peers.robotiq import RobotiqPeer
 from sim.presets import ur3_robotiq
 from tests.drivers.cameras.scene import HEIGHT, WIDTH, Scene, number_in
 
 VIKY = str(Path(genicam.__file__).parent / "viky.cti")
-_hosts = itertools.count(1)
-
-
-def loopback_address() -> str:
-    """An address of this process's own, so that tests may run side by side."""
-    pid = os.getpid()
-    return f"127.{1 + (pid >> 8) % 250}.{pid % 256}.{next(_hosts)}"
 
 
 @dataclass
@@ -89,7 +82,7 @@ def _later(before: Frame, after: Frame) -> bool:
 
 @contextmanager
 def aravis() -> Iterator[Rig]:
-    scene, address = Scene(), loopback_address()
+    scene, address = Scene(), own_address()
     with GigEPeer(CallableCamera(scene.picture), WIDTH, HEIGHT, address=address) as peer:
         camera = AravisCamera(address, GenICamOptions(exposure_s=0.005, gain_db=0.0))
 

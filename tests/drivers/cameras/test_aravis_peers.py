@@ -22,7 +22,7 @@ from drivers.errors import DeviceRefused
 from drivers.genicam_camera import GenICamOptions
 from sim.peers.callable_camera import CallableCamera
 from sim.peers.gige import GigEPeer
-from tests.drivers.cameras.rigs import loopback_address
+from sim.peers.loopback import own_address
 from tests.drivers.cameras.scene import HEIGHT, WIDTH, Scene, number_in
 
 FAKE, TOOL, CLIENT = "arv-fake-gv-camera-0.8", "arv-tool-0.8", "arv-camera-test-0.8"
@@ -100,7 +100,7 @@ def scene() -> Scene:
 @pytest.fixture
 def peer(scene: Scene) -> Iterator[GigEPeer]:
     source = CallableCamera(scene.picture)
-    with GigEPeer(source, WIDTH, HEIGHT, address=loopback_address()) as made:
+    with GigEPeer(source, WIDTH, HEIGHT, address=own_address()) as made:
         yield made
 
 

@@ -16,7 +16,7 @@ from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameL
 from drivers.genicam_camera import GenICamOptions
 from sim.peers.callable_camera import CallableCamera
 from sim.peers.gige import GigEPeer
-from tests.drivers.cameras.rigs import loopback_address
+from sim.peers.loopback import own_address
 from tests.drivers.cameras.scene import HEIGHT, WIDTH, Scene, number_in
 
 FULL_HD = (1920, 1200)
@@ -30,7 +30,7 @@ def scene() -> Scene:
 @pytest.fixture
 def peer(scene: Scene) -> Iterator[GigEPeer]:
     source = CallableCamera(scene.picture)
-    with GigEPeer(source, WIDTH, HEIGHT, address=loopback_address()) as device:
+    with GigEPeer(source, WIDTH, HEIGHT, address=own_address()) as device:
         yield device
 
 
@@ -62,7 +62,7 @@ def test_pixels_come_through_loss_bit_for_bit() -> None:
     width, height = FULL_HD
     picture = np.random.default_rng(1).integers(0, 256, (height, width), dtype=np.uint8)
     source = CallableCamera(lambda _: picture)
-    with GigEPeer(source, width, height, address=loopback_address()) as device:
+    with GigEPeer(source, width, height, address=own_address()) as device:
         device.faults.packet_loss = 0.01
         camera = AravisCamera(device.address, GenICamOptions(exposure_s=0.001))
         camera.connect()
@@ -79,7 +79,7 @@ def test_forty_large_pictures_come_without_a_loss() -> None:
         picture[::256] = next(counter)
         return picture
 
-    with GigEPeer(CallableCamera(counted), size, size, address=loopback_address()) as device:
+    with GigEPeer(CallableCamera(counted), size, size, address=own_address()) as device:
         camera = AravisCamera(device.address, GenICamOptions(exposure_s=0.001))
         camera.connect()
         frames = [camera.grab(5.0) for _ in range(40)]
@@ -91,7 +91,7 @@ def test_forty_large_pictures_come_without_a_loss() -> None:
 def test_sixteen_bit_samples_keep_their_values() -> None:
     picture = np.arange(WIDTH * HEIGHT, dtype=np.uint16).reshape(HEIGHT, WIDTH)
     source = CallableCamera(lambda _: picture)
-    with GigEPeer(source, WIDTH, HEIGHT, address=loopback_address()) as device:
+    with GigEPeer(source, WIDTH, HEIGHT, address=own_address()) as device:
         camera = AravisCamera(device.address, GenICamOptions(pixel_format="Mono16"))
         camera.connect()
         image = camera.grab(5.0).image
@@ -108,7 +108,7 @@ def test_an_incomplete_frame_is_taken_again_never_used() -> None:
         return shown[-1]
 
     retaken = 0
-    with GigEPeer(CallableCamera(picture), WIDTH, HEIGHT, address=loopback_address()) as peer:
+    with GigEPeer(CallableCamera(picture), WIDTH, HEIGHT, address=own_address()) as peer:
         camera = AravisCamera(peer.address, GenICamOptions(exposure_s=0.001))
         camera.connect()
         peer.faults.resend, peer.faults.packet_loss = False, 0.01
@@ -234,7 +234,7 @@ def test_a_dead_camera_frees_the_caller_when_closed(peer: GigEPeer) -> None:
 
 
 def test_no_camera_at_the_address_is_said(scene: Scene) -> None:
-    camera = AravisCamera(loopback_address())
+    camera = AravisCamera(own_address())
     with pytest.raises(DeviceUnreachable, match="check its power, cable and address"):
         camera.connect()
     camera.close()

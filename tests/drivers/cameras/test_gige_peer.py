@@ -14,7 +14,7 @@ import pytest
 
 from sim.peers.callable_camera import CallableCamera
 from sim.peers.gige import GigEPeer
-from tests.drivers.cameras.rigs import loopback_address
+from sim.peers.loopback import own_address
 
 READ_REGISTER, WRITE_REGISTER, READ_MEMORY = 0x80, 0x82, 0x84
 CONTROL_PRIVILEGE, HEARTBEAT_MS, FIRST_URL = 0x0A00, 0x0938, 0x0200
@@ -60,7 +60,7 @@ class Host:
 @pytest.fixture
 def peer() -> Iterator[GigEPeer]:
     source = CallableCamera(lambda _: np.zeros((64, 64), np.uint8))
-    with GigEPeer(source, 64, 64, address=loopback_address(), model="M-1", serial="S-7") as made:
+    with GigEPeer(source, 64, 64, address=own_address(), model="M-1", serial="S-7") as made:
         yield made
 
 

@@ -14,7 +14,7 @@ from drivers.errors import DeviceUnreachable, FrameLost
 from drivers.genicam_camera import GenICamOptions
 from sim.peers.callable_camera import CallableCamera
 from sim.peers.gige import GigEPeer
-from tests.drivers.cameras.rigs import loopback_address
+from sim.peers.loopback import own_address
 from tests.drivers.cameras.scene import HEIGHT, WIDTH, Scene, number_in
 
 FAULTS = 10
@@ -54,7 +54,7 @@ def test_faults_at_random_instants_cost_time_and_never_a_wrong_frame() -> None:
     chance, scene = random.Random(7), Scene()
     source = CallableCamera(scene.picture)
     over = threading.Event()
-    with GigEPeer(source, WIDTH, HEIGHT, address=loopback_address()) as peer:
+    with GigEPeer(source, WIDTH, HEIGHT, address=own_address()) as peer:
         kinds = faults_of(peer, chance)
 
         def inject() -> None:

@@ -15,8 +15,9 @@ from drivers.robotiq import RobotiqCamera
 from sim.camera import SimCamera
 from sim.clock import WallClock
 from sim.peers.gige import GigEPeer
+from sim.peers.loopback import own_address
 from sim.peers.robotiq import RobotiqPeer
-from tests.drivers.cameras.rigs import StandingArm, half_size_cell, loopback_address, turned
+from tests.drivers.cameras.rigs import StandingArm, half_size_cell, turned
 
 CELL = half_size_cell()
 
@@ -28,7 +29,7 @@ def through_gige(source: SimCamera) -> Iterator[Camera]:
         source,
         spec.width_px,
         spec.height_px,
-        address=loopback_address(),
+        address=own_address(),
         focus_steps=spec.focus_steps,
     ) as peer:
         yield AravisCamera(peer.address)
