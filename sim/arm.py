@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -14,7 +14,7 @@ from drivers.arm import ArmState, Motion, MoveTarget
 from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable, SafetyError, StopFailed
 from drivers.targets import check_target
 from sim.clock import Clock
-from sim.motion import Move, plan_move, standing
+from sim.motion import Move, Trapezoid, plan_move, standing
 from sim.noise import PlacedNoise
 
 ACCELERATION_RAD_S2 = 1.4
@@ -38,11 +38,20 @@ class ArmFaults:
         The link is dead: every call raises `DeviceUnreachable`.
     stop_fails:
         `stop` raises `StopFailed` and the arm goes on.
+    brakes_slip:
+        What moves it goes on, whoever brakes.
+    speed_factor:
+        Moves are so many times as fast as they were ordered.
+    bulge_rad:
+        Joint 3 is so far from the straight way, halfway along a move.
     """
 
     protective_stop_at_move: int | None = None
     unreachable: bool = False
     stop_fails: bool = False
+    brakes_slip: bool = False
+    speed_factor: float = 1.0
+    bulge_rad: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -197,6 +206,15 @@ class SimArm:
             self._brake(self._advance())
             self._fault = reason
 
+    def push(self, by_rad: FloatArray, speed_rad_s: float) -> None:
+        """Turn the joints by (6,) angles without an order: a person, a load that sags."""
+        with self._lock:
+            now = self._advance()
+            by = np.asarray(by_rad, float)
+            widest = float(np.abs(by).max())
+            profile = Trapezoid.of(speed_rad_s / widest, ACCELERATION_RAD_S2 / widest)
+            self._move = Move(self._move.joints(now), by, now, profile)
+
     def clear_fault(self) -> None:
         """What an operator does at the pendant after a protective stop."""
         with self._lock:
@@ -221,15 +239,16 @@ class SimArm:
             max_tcp_speed_m_s=MAX_TCP_SPEED_M_S,
             joint_limits_rad=[(low, high) for low, high in self._kinematics.limits_rad],
         )
-        return plan_move(
+        move = plan_move(
             self._kinematics,
             start,
             self._goal(target, start),
             now,
-            flange_speed_m_s=target.tcp_speed_m_s,
-            joint_speed_rad_s=target.joint_speed_rad_s,
+            flange_speed_m_s=target.tcp_speed_m_s * self.faults.speed_factor,
+            joint_speed_rad_s=target.joint_speed_rad_s * self.faults.speed_factor,
             acceleration_rad_s2=ACCELERATION_RAD_S2,
         )
+        return replace(move, bulge_rad=self.faults.bulge_rad * np.eye(6)[2])
 
     def _goal(self, target: MoveTarget, start: FloatArray) -> FloatArray:
         if target.base_from_flange is not None:
@@ -248,7 +267,7 @@ class SimArm:
         return now
 
     def _brake(self, now: float) -> None:
-        if now < self._move.ends_s:
+        if now < self._move.ends_s and not self.faults.brakes_slip:
             self._move = self._move.braked(now, DECELERATION_RAD_S2)
             self._fault_due_s = np.inf
 

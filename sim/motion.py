@@ -107,20 +107,28 @@ class Move:
         When, on the arm's clock.
     profile:
         How the way is covered.
+    bulge_rad:
+        (6,) how far from the straight way it leads, halfway.
     """
 
     start_rad: FloatArray
     travel_rad: FloatArray
     began_s: float
     profile: Profile
+    bulge_rad: FloatArray | float = 0.0
 
     def joints(self, now_s: float) -> FloatArray:
         """(6,) joint angles."""
-        return self.start_rad + self.travel_rad * self.profile.position(now_s - self.began_s)
+        share = self.profile.position(now_s - self.began_s)
+        bulge = 4.0 * share * (1.0 - share) * self.bulge_rad
+        return self.start_rad + self.travel_rad * share + bulge
 
     def speeds(self, now_s: float) -> FloatArray:
         """(6,) joint speeds."""
-        return self.travel_rad * self.profile.speed(now_s - self.began_s)
+        elapsed_s = now_s - self.began_s
+        share = self.profile.position(elapsed_s)
+        way = self.travel_rad + 4.0 * (1.0 - 2.0 * share) * self.bulge_rad
+        return way * self.profile.speed(elapsed_s)
 
     @property
     def ends_s(self) -> float:
@@ -132,7 +140,7 @@ class Move:
         elapsed = now_s - self.began_s
         rate = deceleration_rad_s2 / np.abs(self.travel_rad).max()
         brake = Brake(self.profile.position(elapsed), self.profile.speed(elapsed), rate)
-        return Move(self.start_rad, self.travel_rad, now_s, brake)
+        return replace(self, began_s=now_s, profile=brake)
 
 
 def standing(joints_rad: FloatArray) -> Move:

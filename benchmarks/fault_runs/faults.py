@@ -391,8 +391,11 @@ _ROBOTIQ = (
 
 FAULTS: dict[str, tuple[Fault, ...]] = {
     "ur+gige": (*_UR, *_GIGE),
+    "polyscope-x+gige": _UR,
     "abb+robotiq": (*_ABB, *_ROBOTIQ),
+    "omnicore+robotiq": _ABB,
 }
+"""By cell; what becomes of a camera does not depend on the arm's controller."""
 
 
 def instants(stand: str, fault: Fault, count: int, seed: int) -> list[float]:

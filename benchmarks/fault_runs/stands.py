@@ -6,10 +6,14 @@ the cell runs in a process of its own and knows nothing but their addresses.
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+import re
+import ssl
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +28,16 @@ from sim.camera import SimCamera
 from sim.cell import SimulatedCell
 from sim.clock import SimClock, WallClock
 from sim.peers.abb import ABBController
+from sim.peers.abb.http_server import CERTIFICATE
 from sim.peers.gige import GigEPeer
 from sim.peers.loopback import own_address
 from sim.peers.robotiq import RobotiqPeer
 from sim.peers.ur import URController
 
 CONFIGS = Path(__file__).parents[2] / "configs"
+UR, ABB = "ur", "abb"
 VIEWS = 60
+_ROBOT_API_PORT = 8080  # an ordinary user may not open port 80
 _WIDTH_PX = 320
 _SWAY_DEG = np.array([1.0, 1.0, -1.0, 1.5, 1.5, 10.0])
 
@@ -43,6 +50,8 @@ class Stand:
     ----------
     plan:
         Of `VIEWS` views around the cell's home, each a move of a second or two.
+    maker:
+        Of the arm: `UR` or `ABB`.
     truth, sim:
         What the peers simulate, and the arm behind the controller.
     arm, camera:
@@ -50,6 +59,7 @@ class Stand:
     """
 
     plan: Plan
+    maker: str
     truth: SimulatedCell
     sim: SimArm
     arm: Any
@@ -61,15 +71,18 @@ class Stand:
 
 
 @contextmanager
-def ur_gige(folder: Path) -> Iterator[Stand]:
+def _ur_gige(folder: Path, api_port: int | None) -> Iterator[Stand]:
     """A UR3 and a GigE Vision camera."""
     arm_at, camera_at = own_address(), own_address()
-    robot = {"driver": "ur", "address": arm_at}
+    robot: dict[str, Any] = {"driver": "ur", "address": arm_at}
+    robot |= {} if api_port is None else {"robot_api_port": api_port}
     camera = {"driver": "gige", "model": "gige_camera", "address": camera_at}
     plan = _plan(folder, "ur3-robotiq", robot, camera)
     with ExitStack() as stack:
         truth, sim, source = _built(plan)
-        controller = stack.enter_context(URController(sim, arm_at, kinematics=truth.kinematics))
+        controller = stack.enter_context(
+            URController(sim, arm_at, kinematics=truth.kinematics, robot_api_port=api_port)
+        )
         spec = truth.camera
         peer = GigEPeer(
             source,
@@ -78,25 +91,38 @@ def ur_gige(folder: Path) -> Iterator[Stand]:
             address=camera_at,
             focus_steps=spec.focus_steps,
         )
-        yield Stand(plan, truth, sim, controller, stack.enter_context(peer))
+        yield Stand(plan, UR, truth, sim, controller, stack.enter_context(peer))
 
 
 @contextmanager
-def abb_robotiq(folder: Path) -> Iterator[Stand]:
+def _abb_robotiq(folder: Path, omnicore: bool) -> Iterator[Stand]:
     """An IRB 140 and a Robotiq wrist camera."""
     arm_at, camera_at = own_address(), f"{own_address()}:4242"
-    robot = {"driver": "abb", "address": f"{arm_at}:8610", "factory_password": True}
+    robot: dict[str, Any] = {"driver": "abb", "address": f"{arm_at}:8610", "factory_password": True}
+    robot |= {"certificate_sha256": _certificate()} if omnicore else {}
     camera = {"driver": "robotiq", "model": "robotiq_wrist", "address": camera_at}
     plan = _plan(folder, "irb140-eosens", robot, camera)
     with ExitStack() as stack:
         truth, sim, source = _built(plan)
-        controller = stack.enter_context(ABBController(sim, arm_at))
-        host, _, port = camera_at.partition(":")
-        peer = RobotiqPeer(source, address=host, port=int(port))
-        yield Stand(plan, truth, sim, controller, stack.enter_context(peer))
+        controller = stack.enter_context(ABBController(sim, arm_at, omnicore=omnicore))
+        host, _, camera_port = camera_at.partition(":")
+        peer = RobotiqPeer(source, address=host, port=int(camera_port))
+        yield Stand(plan, ABB, truth, sim, controller, stack.enter_context(peer))
 
 
-STANDS = {"ur+gige": ur_gige, "abb+robotiq": abb_robotiq}
+STANDS: dict[str, Callable[[Path], AbstractContextManager[Stand]]] = {
+    "ur+gige": partial(_ur_gige, api_port=None),
+    "polyscope-x+gige": partial(_ur_gige, api_port=_ROBOT_API_PORT),
+    "abb+robotiq": partial(_abb_robotiq, omnicore=False),
+    "omnicore+robotiq": partial(_abb_robotiq, omnicore=True),
+}
+
+
+def _certificate() -> str:
+    """Fingerprint of the certificate that a simulated OmniCore shows."""
+    shown = re.search(r"-+BEGIN CERT.*?END CERT[^\n]*", CERTIFICATE.read_text(), re.DOTALL)
+    assert shown is not None
+    return hashlib.sha256(ssl.PEM_cert_to_DER_cert(shown[0])).hexdigest()
 
 
 def _plan(folder: Path, name: str, robot: dict[str, Any], camera: dict[str, Any]) -> Plan:

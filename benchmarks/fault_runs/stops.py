@@ -17,7 +17,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.fault_runs.launch import Launch
-from benchmarks.fault_runs.stands import STANDS, Stand
+from benchmarks.fault_runs.stands import ABB, STANDS, UR, Stand
 from cell.sequencer.journal import read_journal
 from cell.storage.files.plan_file import read_plan
 from drivers.arm import MoveTarget
@@ -39,7 +39,10 @@ _TRIES = 3
 _POLL_S, _END_S, _WIRE_S = 0.002, 30.0, 0.1
 _LAST_S = 3.0
 _STOPPED, _ALARM = 4, 5
-_ORDERS = ("dashboard: stop", "script: stopj", "script refused", "rws: stop", "rws: motors off")
+_ORDERS = (
+    *("dashboard: stop", "robot api: stop", "script: stopj", "script refused"),
+    *("rws: stop", "rws: motors off"),
+)
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,9 @@ class Kind:
     arrives:
         Whether orders reach it at all.
     confirmed:
-        Cells in which true readings tell of the stop, so that it must be confirmed.
+        Makers of the arms whose true readings tell of the stop, so that it must be confirmed.
     either:
-        Cells in which it may be confirmed by something else that is true.
+        Makers of the arms with which it may be confirmed by something else that is true.
     """
 
     name: str
@@ -65,7 +68,7 @@ class Kind:
     either: tuple[str, ...] = ()
 
 
-_ALL = tuple(STANDS)
+_ALL = (UR, ABB)
 _CUT = {"mute": True, "deaf": True}
 KINDS = (
     Kind("obeyed", confirmed=_ALL),
@@ -76,10 +79,10 @@ KINDS = (
     Kind("cable cut, no watchdog", _CUT | {"watchdog_fails": True}, arrives=False),
     Kind("mute", {"mute": True}),
     # Robot Web Services tell no clock that could stand still
-    Kind("frozen clock", {"frozen_clock": True}, confirmed=("abb+robotiq",)),
+    Kind("frozen clock", {"frozen_clock": True}, confirmed=(ABB,)),
     # joints that never change are told from an arm at rest only by the way it must have gone
     # since; where they are as new as the order, RAPID's having stopped is what confirms it
-    Kind("old readings", {"old_readings": True}, either=("abb+robotiq",)),
+    Kind("old readings", {"old_readings": True}, either=(ABB,)),
 )
 
 
@@ -103,13 +106,13 @@ class StopTrial:
     exit_status: int | None
     said: str
 
-    def complaints(self, kind: Kind, stand: str) -> list[str]:
+    def complaints(self, kind: Kind, maker: str) -> list[str]:
         """What was not as it must be."""
         found = []
         if self.exit_status == _STOPPED and self.moving:
             found.append("told as stopped while it moved")
-        wanted = _STOPPED if stand in kind.confirmed else _ALARM
-        if stand in kind.either and self.exit_status == _STOPPED:
+        wanted = _STOPPED if maker in kind.confirmed else _ALARM
+        if maker in kind.either and self.exit_status == _STOPPED:
             wanted = _STOPPED
         if self.exit_status != wanted:
             found.append(f"exit status {self.exit_status}, not {wanted}")
@@ -121,11 +124,11 @@ class StopTrial:
 
 
 @contextmanager
-def slow_stand(name: str, folder: Path) -> Iterator[Stand]:
+def slow_stand(name: str, folder: Path, joint_speed_deg_s: float = _SLOW_DEG_S) -> Iterator[Stand]:
     """A cell of `STANDS` whose arm makes long, slow moves."""
     with STANDS[name](folder) as stand:
         path = stand.plan.path
-        plan = json.loads(path.read_text()) | {"joint_speed_deg_s": _SLOW_DEG_S}
+        plan = json.loads(path.read_text()) | {"joint_speed_deg_s": joint_speed_deg_s}
         for number, view in enumerate(plan["views"]):
             view["joints_deg"][-1] += _WIDE_DEG if number % 2 else -_WIDE_DEG
         path.write_text(json.dumps(plan))
@@ -136,22 +139,22 @@ def stop_trial(stand: Stand, folder: Path, kind: Kind, instant_s: float) -> Stop
     """One stop, `instant_s` after the first motion; None where the run ended before it."""
     launch = Launch(stand.plan.path, folder)
     try:
-        if not (_moving(stand, launch) and _moving(stand, launch, time.monotonic() + instant_s)):
+        if not (moving(stand, launch) and moving(stand, launch, time.monotonic() + instant_s)):
             return None
         return _stopped(stand, folder, kind, launch)
     finally:
         launch.finish()
         stand.arm.restore()
         stand.arm.halt("the trial is over")
-        _home(stand)
+        home(stand)
 
 
-def _home(stand: Stand) -> None:
-    """Back to where the plan's first, long move begins."""
+def home(stand: Stand) -> None:
+    """Drive it back to where the plan's first, long move begins."""
     assert stand.plan.cell.layout is not None
     _wait_for_rest(stand)
-    home = np.radians(stand.plan.cell.layout.home_deg)
-    stand.sim.start_move(MoveTarget(tuple(home.tolist()), None, 5.0, 2.0))
+    joints = np.radians(stand.plan.cell.layout.home_deg)
+    stand.sim.start_move(MoveTarget(tuple(joints.tolist()), None, 5.0, 2.0))
     _wait_for_rest(stand)
 
 
@@ -160,7 +163,7 @@ def _wait_for_rest(stand: Stand) -> None:
         time.sleep(_POLL_S)
 
 
-def _moving(stand: Stand, launch: Launch, from_s: float = 0.0) -> bool:
+def moving(stand: Stand, launch: Launch, from_s: float = 0.0) -> bool:
     """Wait until the arm moves, at that time or after it; False where the run ended before."""
     while time.monotonic() < from_s or not stand.truly_moving():
         if launch.ended:
@@ -172,8 +175,15 @@ def _moving(stand: Stand, launch: Launch, from_s: float = 0.0) -> bool:
 def _stopped(stand: Stand, folder: Path, kind: Kind, launch: Launch) -> StopTrial:
     for name, value in kind.faults.items():
         setattr(stand.arm.faults, name, value)
+    return seen_through(stand, folder, launch, lambda: launch.send(signal.SIGINT))
+
+
+def seen_through(
+    stand: Stand, folder: Path, launch: Launch, happens: Callable[[], None]
+) -> StopTrial:
+    """Let it happen, and look at arm and controller until the run has ended."""
     asked_s, asked_unix_s = time.monotonic(), time.time()
-    launch.send(signal.SIGINT)
+    happens()
     moved: list[tuple[float, bool]] = []
     while not launch.ended and time.monotonic() < asked_s + _END_S:
         moved.append((time.monotonic() - asked_s, stand.truly_moving()))
@@ -210,11 +220,11 @@ def stops_of(stand: Stand, folder: Path, name: str, kind: Kind, count: int, seed
         words = "-".join(kind.name.replace(",", "").split())
         trial = stop_trial(stand, folder / f"{words}-{number}", kind, chance.uniform(0.0, _LAST_S))
         if trial is not None:
-            found.append((trial, trial.complaints(kind, name)))
+            found.append((trial, trial.complaints(kind, stand.maker)))
     return found
 
 
-def _worst(values: list[float | None]) -> str:
+def worst(values: list[float | None]) -> str:
     told = [value for value in values if value is not None]
     missing = len(values) - len(told)
     worst = f"{max(told):.3f} s" if told else "-"
@@ -230,9 +240,9 @@ def _row(name: str, kind: Kind, found: list[Any]) -> str:
         kind.name,
         f"{good} of {len(found)}",
         f"{confirmed} of {len(found)}",
-        _worst([trial.order_s for trial in trials]),
-        _worst([trial.halt_s for trial in trials]),
-        _worst([trial.word_s for trial in trials]),
+        worst([trial.order_s for trial in trials]),
+        worst([trial.halt_s for trial in trials]),
+        worst([trial.word_s for trial in trials]),
         ", ".join(sorted({str(trial.exit_status) for trial in trials})),
     ]
     return f"| {' | '.join(cells)} |"

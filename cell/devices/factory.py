@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 
 from calib.chain.kinematics import UnknownArm, arm
@@ -162,8 +163,17 @@ def arm_of(cell: CellFile) -> Arm:
         from cell.devices.abb_settings import abb_settings
         from drivers.abb import ABBArm
 
-        return ABBArm(robot.address, abb_settings(robot))
+        return ABBArm(robot.address, replace(abb_settings(robot), joint_limits_rad=_limits(cell)))
     raise InputError(_only_simulated(cell, "arm"))
+
+
+def _limits(cell: CellFile) -> tuple[tuple[float, float], ...]:
+    """Joint limits of a cell's arm, radians; raises `InputError` for one that is not known."""
+    try:
+        limits_rad = arm(cell.robot.model or "").limits_rad
+    except UnknownArm as unknown:
+        raise InputError(f"cell {cell.name}: robot.model: {unknown}") from None
+    return tuple((float(low), float(high)) for low, high in limits_rad)
 
 
 def camera_of(cell: CellFile) -> Camera:

@@ -25,7 +25,7 @@ _ON_PATH_RAD = 0.005
 """Nearer to the way, the guard's check of the way itself holds."""
 _FASTER = 1.25
 _STILL_RAD_S, _STILL_M_S = 0.05, 0.02
-_WINDOW_S, _SHORTEST_S = 0.3, 0.2
+_WINDOW_S, _SHORTEST_S, _INSTANT_S = 0.3, 0.2, 1e-3
 _UNCLOCKED_S, _UNCLOCKED_WINDOW_S = 0.8, 3.0
 """A reading without the controller's time may be so much older or newer than it seems: speeds are
 then taken over a longer time."""
@@ -61,6 +61,8 @@ class ReadingWatch:
         self._way, self._moves, self._allowed_rad = (here_rad, there_rad), True, CORRIDOR_RAD
         travel = np.abs(there_rad - here_rad)
         self._joint_speed_rad_s = joint_speed_rad_s * travel / max(float(travel.max()), 1e-12)
+        while len(self._recent) > 1:  # what the arm did on its way here was another move
+            self._recent.popleft()
 
     def stands(self, where_rad: FloatArray, within_rad: float = STANDING_RAD) -> None:
         """The arm is to stand at (6,) joint angles."""
@@ -155,13 +157,7 @@ class ReadingWatch:
     def _check_speed(self, state: ArmState) -> None:
         told = state.joint_velocity_rad_s
         if told is not None:
-            over = np.abs(told) - (_FASTER * self._joint_speed_rad_s + _STILL_RAD_S)
-            joint = int(over.argmax())
-            if not over[joint] <= 0.0:
-                raise SafetyError(
-                    f"joint {joint + 1} turns at {np.degrees(abs(told[joint])):.1f}°/s, its move"
-                    f" allows {np.degrees(self._joint_speed_rad_s[joint]):.1f}°/s"
-                )
+            self._check_joint_speeds(np.abs(told))
         first = self._recent[0]
         elapsed_s = _elapsed_s(first, state)
         if state.host_t_s - first.host_t_s < _SHORTEST_S:
@@ -173,7 +169,19 @@ class ReadingWatch:
                 f"the flange moved {1e3 * way_m:.0f} mm within {elapsed_s:.2f} s, the plan allows"
                 f" {limit_m_s:g} m/s"
             )
+        # Robot Web Services tell no speeds, and a controller that does may tell the ordered ones
+        turned = np.subtract(state.joints_rad or (), first.joints_rad or ())
+        self._check_joint_speeds(np.abs(turned) / max(elapsed_s, _INSTANT_S))
         self._check_alive(first, state, elapsed_s)
+
+    def _check_joint_speeds(self, speeds_rad_s: FloatArray) -> None:
+        over = speeds_rad_s - (_FASTER * self._joint_speed_rad_s + _STILL_RAD_S)
+        joint = int(over.argmax())
+        if not over[joint] <= 0.0:
+            raise SafetyError(
+                f"joint {joint + 1} turns at {np.degrees(speeds_rad_s[joint]):.1f}°/s, its move"
+                f" allows {np.degrees(self._joint_speed_rad_s[joint]):.1f}°/s"
+            )
 
     def _check_alive(self, first: ArmState, state: ArmState, elapsed_s: float) -> None:
         """A speed that moves nothing is an old reading's."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from calib.chain.kinematics import arm as kinematics_of
 from cell.devices.factory import arm_of, camera_of
@@ -43,6 +44,36 @@ def test_a_simulated_cell_is_ready(tmp_path: Path) -> None:
     findings = examine(cell_with(tmp_path))
     assert not [finding.line() for finding in findings if finding.blocks]
     assert by_name(findings, "numpy").found.startswith("2.")
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        "{driver: sim, model: kr10}",
+        "{driver: ur, model: kr10, address: 127.0.0.77}",
+        "{driver: abb, model: kr10, address: 127.0.0.77, factory_password: true}",
+        "{driver: ur, address: 127.0.0.77}",
+    ],
+)
+def test_an_arm_whose_kinematics_nobody_knows_is_in_the_way(tmp_path: Path, robot: str) -> None:
+    finding = by_name(examine(cell_with(tmp_path, robot)), "kinematics")
+    assert finding.blocks
+    assert "robot.model" in finding.found
+    assert "irb140" in finding.mend
+
+
+@pytest.mark.parametrize("key", ["workspace", "keep_out"])
+def test_a_real_arm_that_nothing_bounds_is_in_the_way(tmp_path: Path, key: str) -> None:
+    real = "{driver: ur, model: ur5e, address: 127.0.0.77}"
+    file = YAML().load(CELL.replace(SIM_ROBOT, real))
+    del file[key]
+    with (tmp_path / "c.yaml").open("w") as out:
+        YAML().dump(file, out)
+    finding = by_name(examine(read_cell(tmp_path / "c.yaml")), "workspace and keep-out")
+    assert finding.blocks
+    assert f"`{key}`" in finding.found
+    whole = by_name(examine(cell_with(tmp_path, real)), "workspace and keep-out")
+    assert whole.line() == "ok   workspace and keep-out boxes: workspace, 1 keep-out boxes"
 
 
 def test_a_silent_robot_is_in_the_way(tmp_path: Path) -> None:
@@ -261,6 +292,12 @@ def test_a_missing_producer_is_in_the_way(tmp_path: Path) -> None:
     finding = by_name(examine(cell_with(tmp_path, camera=camera)), "GenTL producer")
     assert finding.blocks
     assert "/nowhere/coaxlink.cti is not there" in finding.line()
+
+
+def test_an_abb_arm_is_held_to_the_limits_of_its_own_model(tmp_path: Path) -> None:
+    robot = "{driver: abb, model: irb120, address: 10.0.0.1, factory_password: true}"
+    limits_rad = arm_of(cell_with(tmp_path, robot))._settings.joint_limits_rad
+    assert np.array(limits_rad) == pytest.approx(kinematics_of("irb120").limits_rad)
 
 
 def test_the_driver_follows_the_cell_file(tmp_path: Path) -> None:

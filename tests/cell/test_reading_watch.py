@@ -134,6 +134,27 @@ def test_a_joint_told_to_be_faster_than_its_move_is_stopped(bench: Bench) -> Non
     stopped_for(bench, "joint 5 turns at 114.6°/s")
 
 
+@pytest.mark.parametrize("clock", [True, False], ids=["clocked", "no clock"])
+def test_a_joint_that_is_faster_than_its_move_is_stopped_though_no_speed_is_told(
+    tmp_path: Path, clock: bool
+) -> None:
+    """As Robot Web Services do; a wrist that turns moves neither flange nor camera."""
+    wrist = "- {joints_deg: [40, -85, 90, -90, -90, 170]}\n"
+    bench = Bench(tmp_path, LONG_WAY + wrist + NO_BOARD)
+    if clock:
+        clocked(bench)
+    told = bench.arm.state
+    bench.arm.state = lambda: replace(told(), joint_velocity_rad_s=None)  # type: ignore
+    start_move = bench.arm.start_move
+
+    def hastily(target):  # type: ignore[no-untyped-def]
+        start_move(target)
+        bench.arm.takes_s /= 2.0 if bench.arm.end[5] > 2.0 else 1.0
+
+    bench.arm.start_move = hastily  # type: ignore[method-assign]
+    stopped_for(bench, "joint 6 turns at")
+
+
 def old(bench: Bench) -> Falsify:
     """Values as they were on the way, told anew with the clock going on."""
     kept: list[ArmState] = []

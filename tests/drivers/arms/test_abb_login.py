@@ -168,7 +168,7 @@ def test_readings_that_cannot_be_are_refused_by_name(name, value, words):
             arm.connect()
             resources.answer = answer
             arm.start_move(slowly(tuple(angle + 0.3 for angle in ABB_HOME)))
-            assert until(lambda: arm.state().fault is not None, 5.0)
+            assert until(lambda: arm.state().fault is not None)
             assert words in arm.state().fault
         finally:
             arm.close()

@@ -5,7 +5,17 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from benches import ABB_HOME, UR_FAR, abb_peer, slowly, stays, truly_moving, until, ur_peer
+from benches import (
+    ABB_HOME,
+    UR_FAR,
+    abb_peer,
+    halts_short_of,
+    slowly,
+    stays,
+    truly_moving,
+    until,
+    ur_peer,
+)
 
 from drivers.abb import FACTORY_LOGIN, ABBSettings
 from drivers.abb.guard import StopSession
@@ -66,7 +76,7 @@ def moves_on(sim, duration_s):
 def test_an_obeyed_stop_is_taken_and_the_arm_halts(moving):
     _, sim, stop = moving
     assert stop()
-    assert until(lambda: not truly_moving(sim), 1.0)
+    assert halts_short_of(sim, UR_FAR, ABB_FAR)
     assert stays(sim)
 
 
@@ -84,7 +94,7 @@ def test_a_late_stop_is_taken_and_obeyed_when_the_time_has_passed(moving):
     since_s = time.monotonic()
     assert stop()
     assert truly_moving(sim)
-    assert until(lambda: not truly_moving(sim), 2.0)
+    assert halts_short_of(sim, UR_FAR, ABB_FAR)
     assert time.monotonic() - since_s > LATE_S
 
 
@@ -99,7 +109,7 @@ def test_a_guard_or_a_collision_stops_the_arm_whatever_becomes_of_orders(moving)
     controller, sim, _ = moving
     controller.faults.stops = Stops.IGNORED
     controller.emergency_stop()
-    assert until(lambda: not truly_moving(sim), 1.0)
+    assert halts_short_of(sim, UR_FAR, ABB_FAR)
 
 
 def test_behind_a_cut_cable_nothing_arrives(moving):
@@ -113,7 +123,7 @@ def test_a_mute_controller_obeys_and_does_not_answer():
     with ur_moving() as (controller, sim, stop):
         controller.faults.mute = True
         assert not stop()
-        assert until(lambda: not truly_moving(sim), 1.0)
+        assert halts_short_of(sim, UR_FAR, ABB_FAR)
 
 
 @contextmanager

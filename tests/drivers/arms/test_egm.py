@@ -59,7 +59,7 @@ class Wire:
         """Whether the newest reading becomes the one of this datagram."""
         seen = self.reader.refused.total(), self.reader._newest
         self.sends(datagram)
-        assert until(lambda: (self.reader.refused.total(), self.reader._newest) != seen, 2.0)
+        assert until(lambda: (self.reader.refused.total(), self.reader._newest) != seen)
         return self.reader._newest is not seen[1]
 
 
@@ -69,7 +69,13 @@ def wire():
         yield made
 
 
-def test_a_reading_of_the_controllers_is_believed(wire):
+@pytest.fixture
+def patient(monkeypatch):
+    """On a busy machine a stream would count as silent, and the next datagram as a new one's."""
+    monkeypatch.setattr(egm, "_FRESH_S", 60.0)
+
+
+def test_a_reading_of_the_controllers_is_believed(wire, patient):
     assert wire.believes(message())
     reading = wire.reader.fresh()
     assert reading.joints_rad == pytest.approx(ABB_HOME)
@@ -79,7 +85,7 @@ def test_a_reading_of_the_controllers_is_believed(wire):
 
 def test_nothing_is_believed_from_another_address(wire, caplog):
     wire.sends(message(number=5), wire.stranger)
-    assert until(lambda: wire.reader.refused.total() == 1, 2.0)
+    assert until(lambda: wire.reader.refused.total() == 1)
     assert wire.reader.fresh() is None
     assert "it comes from 127.0.0.1, not from 127." in caplog.text
     assert wire.believes(message(number=1))
@@ -102,7 +108,7 @@ BAD = [
 
 @pytest.mark.parametrize(("words", "datagram"), BAD)
 def test_what_cannot_be_a_reading_is_dropped_and_told_and_the_next_one_counts(
-    wire, caplog, words, datagram
+    wire, caplog, words, datagram, patient
 ):
     assert not wire.believes(datagram)
     assert words in caplog.text
@@ -111,11 +117,7 @@ def test_what_cannot_be_a_reading_is_dropped_and_told_and_the_next_one_counts(
 
 
 @pytest.mark.parametrize("number", [10, 9, 1])
-def test_a_datagram_that_was_overtaken_or_is_sent_again_is_not_the_newest(
-    wire, number, monkeypatch
-):
-    # on a busy machine the stream would count as silent, and the next datagram as a new one's
-    monkeypatch.setattr(egm, "_FRESH_S", 60.0)
+def test_a_datagram_that_was_overtaken_or_is_sent_again_is_not_the_newest(wire, number, patient):
     assert wire.believes(message(number=10, clock_ms=1000))
     assert not wire.believes(message(number=number, clock_ms=1008))
     assert wire.believes(message(number=11, clock_ms=1008))
@@ -128,14 +130,14 @@ def test_a_count_that_wraps_goes_on(wire):
 
 def test_a_clock_that_stands_gives_no_fresh_reading_ever(wire):
     assert wire.believes(message(number=1, clock_ms=1000))
-    assert until(lambda: wire.reader.fresh() is None, 2.0)
+    assert until(lambda: wire.reader.fresh() is None)
     assert not wire.believes(message(number=2, clock_ms=1000))
     assert wire.reader.fresh() is None
 
 
 def test_a_new_stream_counts_from_its_own_beginning(wire):
     assert wire.believes(message(number=500, clock_ms=1000))
-    assert until(lambda: wire.reader.fresh() is None, 2.0)
+    assert until(lambda: wire.reader.fresh() is None)
     assert wire.believes(message(number=1, clock_ms=2000))
 
 
@@ -144,9 +146,16 @@ def test_a_flood_is_told_once_for_a_reason_and_the_reader_lives(wire, caplog):
     for n in range(300):
         wire.sends(bytes([n % 256]) * (n % 50))
         wire.sends(message(number=n), wire.stranger)
-    assert until(lambda: wire.reader.refused.total() > 100, 3.0)
-    assert len(caplog.records) <= 3
-    assert until(lambda: wire.believes(message(number=7)), 3.0)
+    assert until(lambda: wire.reader.refused.total() > 100)
+    # as many words as reasons, however many datagrams the system dropped before they were read
+    assert len(caplog.records) == len(wire.reader.refused) <= 3
+
+    def heard():
+        # what is left of the flood is refused meanwhile, and a datagram may be dropped by it
+        wire.sends(message(number=7))
+        return wire.reader._newest is not None
+
+    assert until(heard)
 
 
 @given(st.binary(max_size=600))

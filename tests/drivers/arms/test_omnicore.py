@@ -6,11 +6,13 @@ from contextlib import contextmanager
 import pytest
 from benches import (
     ABB_HOME,
+    PATIENT_ABB,
     abb_peer,
     abb_settings,
     best_of_three,
     free_udp_port,
     halted_s,
+    halts_short_of,
     slowly,
     stays,
     truly_moving,
@@ -31,10 +33,10 @@ FAR = tuple(angle + 0.6 for angle in ABB_HOME)
 
 
 @contextmanager
-def moving(egm=False):
+def moving(egm=False, **settings):
     port = free_udp_port() if egm else None
     with abb_peer(port, omnicore=True) as (controller, sim):
-        arm = ABBArm(controller.url, abb_settings(controller, egm_port=port))
+        arm = ABBArm(controller.url, abb_settings(controller, egm_port=port, **settings))
         try:
             arm.connect()
             arm.start_move(slowly(FAR))
@@ -69,7 +71,7 @@ def test_a_stop_reaches_the_arm_within_100_ms():
             since_s = time.monotonic()
             arm.stop()
             latency_s = halted_s(controller, since_s)
-            assert until(lambda: not truly_moving(sim))
+            assert halts_short_of(sim, FAR)
             assert stays(sim)
             return latency_s
 
@@ -77,17 +79,17 @@ def test_a_stop_reaches_the_arm_within_100_ms():
 
 
 def test_a_refused_stop_switches_the_motors_off():
-    with moving() as (arm, controller, sim):
+    with moving(**PATIENT_ABB) as (arm, controller, sim):
         controller.faults.rapid_stop_refused = True
         arm.stop()
-        assert until(lambda: not truly_moving(sim), 1.0)
+        assert halts_short_of(sim, FAR)
         assert controller.panel.controller == "motoroff"
 
 
 def test_a_cut_cable_stops_the_motion_under_way():
     with moving() as (_, controller, sim):
         controller.cut()
-        assert until(lambda: not truly_moving(sim), 2.0)
+        assert halts_short_of(sim, FAR)
         assert controller.watch.values["stops"] == 1
         controller.faults.mend_cable()
 
@@ -104,13 +106,13 @@ def test_a_stop_that_is_refused_by_every_path_is_told():
                 return "refuses" in str(failed) or "still moves" in str(failed)
             return False
 
-        assert until(told, 5.0)
+        assert until(told)
 
 
 def test_a_guard_stop_is_told_with_what_to_do():
-    with moving() as (arm, controller, sim):
+    with moving(**PATIENT_ABB) as (arm, controller, sim):
         controller.guard_stop()
-        assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT, 4.0)
+        assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT)
         assert "reset the guard" in arm.state().fault
         assert stays(sim)
         with pytest.raises(ArmStopped, match="guard"):
@@ -118,8 +120,8 @@ def test_a_guard_stop_is_told_with_what_to_do():
 
 
 def test_egm_tells_joints_and_pose_on_the_way():
-    with moving(egm=True) as (arm, _, _):
-        assert until(lambda: arm.state().raw["source"] == "egm", 2.0)
+    with moving(egm=True, **PATIENT_ABB) as (arm, _, _):
+        assert until(lambda: arm.state().raw["source"] == "egm")
 
 
 def test_mastership_is_taken_for_writing_and_given_back():

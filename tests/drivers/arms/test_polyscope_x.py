@@ -7,12 +7,13 @@ from contextlib import suppress
 import pytest
 from benches import (
     ROBOT_API_PORT,
+    UR_FAR,
     UR_HOME,
     best_of_three,
     halted_s,
+    halts_short_of,
     quickly,
     stays,
-    truly_moving,
     until,
     ur_moving,
     ur_peer,
@@ -75,7 +76,7 @@ def test_a_stop_reaches_the_arm_over_the_robot_api_alone():
             arm.stop()
             latency_s = halted_s(controller, since_s)
             assert [e for e in controller.events if e.what == "robot api: stop"]
-            assert until(lambda: not truly_moving(sim))
+            assert halts_short_of(sim, UR_FAR)
             assert stays(sim)
             return latency_s
 
@@ -86,7 +87,7 @@ def test_a_stop_finds_its_way_after_the_connections_were_dropped():
     with moving() as (arm, controller, sim):
         controller.drop()
         arm.stop()
-        assert until(lambda: not truly_moving(sim), 1.0)
+        assert halts_short_of(sim, UR_FAR)
         assert stays(sim)
 
 
@@ -95,7 +96,7 @@ def test_a_stop_that_is_refused_is_repeated_until_the_watchdog_stops_the_arm():
         controller.faults.stops = Stops.REFUSED
         arm.stop()
         orders = [event for event in controller.events if event.what == "robot api: stop"]
-        assert until(lambda: not truly_moving(sim), 6.0)
+        assert halts_short_of(sim, UR_FAR)
         assert len(orders) < len([e for e in controller.events if e.what == "robot api: stop"])
 
 
@@ -118,10 +119,10 @@ def test_recovering_from_a_protective_stop_obeys_the_five_second_rule():
 def test_a_switch_to_local_mode_stops_the_run():
     with moving() as (arm, controller, sim):
         controller.remote_control = False
-        assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT, 5.0)
+        assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT)
         assert "local mode" in arm.state().fault
         # its watchdog stops it: in local mode it takes no orders
-        assert until(lambda: not truly_moving(sim), 4.0)
+        assert halts_short_of(sim, UR_FAR)
 
 
 def answering(body, status=b"200 OK"):

@@ -1,0 +1,208 @@
+"""An arm that does something else than it was told, in whole runs through the drivers, as a table.
+
+    python -m benchmarks.fault_runs.disturbances [--stand ur+gige] [--only WORDS] [--instants 10]
+
+Each trial is a `cell run` in a process of its own, against peers. Where the arm stands, it is
+pushed or sags; on its way, the controller takes another one, or drives faster than ordered. Nobody
+tells the run; only its readings do. It must end with exit status 5 and say which of these it was,
+and the arm must stand. Times are from the push, or from the first motion of the move that is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.fault_runs.launch import Launch
+from benchmarks.fault_runs.stands import STANDS, Stand
+from benchmarks.fault_runs.stops import StopTrial, home, moving, seen_through, slow_stand, worst
+
+_SPEED_DEG_S = 10.0
+_SAFETY = 5
+_FIRST_S, _LAST_S = 0.3, 6.0
+_STANDING_S, _POLL_S = 0.2, 0.002
+_TRIES = 4
+_ELBOW = np.eye(6)[2]
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """One thing that the arm does.
+
+    Attributes
+    ----------
+    name:
+        In the table.
+    words:
+        Pattern of what the operator must be told.
+    prepare:
+        Makes the controller ready for it.
+    push:
+        Moves the arm where it stands; None where the next move is the wrong one.
+    stands:
+        Whether the arm can be stopped at all.
+    """
+
+    name: str
+    words: str
+    prepare: Callable[[Stand], None] = lambda stand: None
+    push: Callable[[Stand], None] | None = None
+    stands: bool = True
+
+
+def _pushes(by_deg: float, speed_rad_s: float) -> Callable[[Stand], None]:
+    return lambda stand: stand.sim.push(np.radians(by_deg) * _ELBOW, speed_rad_s)
+
+
+def _sets(**faults: object) -> Callable[[Stand], None]:
+    def prepare(stand: Stand) -> None:
+        for name, value in faults.items():
+            setattr(stand.sim.faults, name, value)
+
+    return prepare
+
+
+def _stops_and_sags(stand: Stand) -> None:
+    stop = getattr(stand.arm, "protective_stop", None) or stand.arm.guard_stop
+    stop()
+    _pushes(20.0, 0.05)(stand)
+
+
+DISTURBANCES = (
+    Disturbance("pushed where it stands", "moved where it was to stand", push=_pushes(1.5, 0.2)),
+    Disturbance("sags where it stands", "moved where it was to stand", push=_pushes(20.0, 0.03)),
+    Disturbance("another way, 8° beside", "left the way", _sets(bulge_rad=float(np.radians(8.0)))),
+    Disturbance(
+        "2.5 times as fast as ordered", "turns at|the plan allows", _sets(speed_factor=2.5)
+    ),
+    Disturbance(
+        "stops by itself, and sags on",
+        "THE ARM DOES NOT STOP",
+        _sets(brakes_slip=True),
+        _stops_and_sags,
+        stands=False,
+    ),
+)
+
+
+def complaints(kind: Disturbance, trial: StopTrial) -> list[str]:
+    """What was not as it must be."""
+    found = []
+    if trial.exit_status != _SAFETY:
+        found.append(f"exit status {trial.exit_status}, not {_SAFETY}")
+    if re.search(kind.words, trial.said) is None:
+        found.append(f"the operator is not told '{kind.words}'")
+    if kind.stands and trial.moving:
+        found.append("the arm moved when the run said what became of it")
+    if "Traceback" in trial.said:
+        found.append("a traceback")
+    return found
+
+
+def trial_of(stand: Stand, folder: Path, kind: Disturbance, instant_s: float) -> StopTrial | None:
+    """Let it happen at the first occasion from then on; None where the run ended before it."""
+    launch = Launch(stand.plan.path, folder)
+    try:
+        due_s = time.monotonic() + instant_s
+        if not (moving(stand, launch) and _standing(stand, launch, due_s)):
+            return None
+        kind.prepare(stand)
+        if kind.push is None and not moving(stand, launch):
+            return None
+        push = kind.push
+        return seen_through(stand, folder, launch, (lambda: push(stand)) if push else lambda: None)
+    finally:
+        launch.finish()
+        for name, value in vars(type(stand.sim.faults)()).items():
+            setattr(stand.sim.faults, name, value)
+        stand.arm.restore()
+        stand.sim.stop()
+        home(stand)
+
+
+def _standing(stand: Stand, launch: Launch, from_s: float) -> bool:
+    """Wait until the arm has stood for a while, at that time or after it."""
+    since_s = np.inf
+    while time.monotonic() < max(from_s, since_s + _STANDING_S) or since_s == np.inf:
+        if launch.ended:
+            return False
+        since_s = np.inf if stand.truly_moving() else min(since_s, time.monotonic())
+        time.sleep(_POLL_S)
+    return True
+
+
+def trials_of(
+    stand: Stand, folder: Path, name: str, kind: Disturbance, count: int, seed: int
+) -> list[StopTrial]:
+    """The same disturbance at random instants, the same ones every time."""
+    chance = random.Random(f"{seed} {name} {kind.name}")
+    found: list[StopTrial] = []
+    for number in range(_TRIES * count):
+        if len(found) == count:
+            break
+        words = "-".join(re.findall(r"\w+", kind.name))
+        instant_s = chance.uniform(_FIRST_S, _LAST_S)
+        trial = trial_of(stand, folder / f"{words}-{number}", kind, instant_s)
+        found += [] if trial is None else [trial]
+    return found
+
+
+def _row(name: str, kind: Disturbance, trials: list[StopTrial]) -> str:
+    good = sum(not complaints(kind, trial) for trial in trials)
+    cells = [
+        name,
+        kind.name,
+        f"{good} of {len(trials)}",
+        worst([trial.order_s for trial in trials]),
+        worst([trial.halt_s for trial in trials]) if kind.stands else "-",
+        worst([trial.word_s for trial in trials]),
+        ", ".join(sorted({str(trial.exit_status) for trial in trials})),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print the table; exit status 1 unless everything was as it must be."""
+    asked = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    asked.add_argument("--stand", choices=STANDS)
+    asked.add_argument("--only", default="")
+    asked.add_argument("--instants", type=int, default=10)
+    asked.add_argument("--seed", type=int, default=1)
+    words: Any = asked.parse_args()
+    bad = 0
+    print(
+        "| cell | the arm | stopped and told | stop order, worst | halt, worst | word, worst"
+        " | exit |\n|---|---|---|---|---|---|---|"
+    )
+    for name in STANDS:
+        if words.stand not in (None, name):
+            continue
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            slow_stand(name, Path(folder), _SPEED_DEG_S) as stand,
+        ):
+            for kind in DISTURBANCES:
+                if words.only not in kind.name:
+                    continue
+                trials = trials_of(stand, Path(folder), name, kind, words.instants, words.seed)
+                print(_row(name, kind, trials), flush=True)
+                for trial in trials:
+                    for complaint in complaints(kind, trial):
+                        bad += 1
+                        print(f"{name}: {kind.name}: {complaint}\n{trial.said}", file=sys.stderr)
+                bad += words.instants - len(trials)
+    sys.exit(bool(bad))
+
+
+if __name__ == "__main__":
+    main()
