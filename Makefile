@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 # No picture is rendered, no arm driven, no page opened, no whole recording diagnosed
-FAST := tests/chain/test_projection.py tests/chain/test_rigid.py tests/chain/test_walk.py tests/kinematics \
+FAST := tests/chain/test_projection.py tests/chain/test_rigid.py tests/chain/test_evaluation.py tests/kinematics \
   tests/paper tests/solver/test_free_poses.py tests/cell/test_files.py tests/cell/test_recording.py \
   tests/cell/test_session.py tests/cell/test_worker.py tests/docs/test_architecture.py
 export OPENBLAS_NUM_THREADS ?= 1

@@ -35,10 +35,10 @@ from scipy.spatial.transform import Rotation
 from calib.calibration.uncertainty import optics_at, projection_sigma_px, workpiece_sigma_m
 from calib.chain import rigid
 from calib.chain.effects import make_effect
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.solver.free_poses import fit_free_poses
 from calib.solver.joint import JointFit, fit_joint
 from calib.solver.noise import Noise
@@ -126,7 +126,7 @@ def simulate(camera: str, mount: Mount, kind: str, seed: int) -> tuple[CellModel
     n = len(flange)
     blank = Views.blank(board, width_px=width, height_px=height, frames=n, mount=mount)
     true = replace(blank, base_from_flange=flange)
-    state = walk(model, true)
+    state = evaluate(model, true)
     corners = project(state.optics, state.camera_from_board, state.points_m)
     corners += rng.normal(0, NOISE_PX, corners.shape)
     if board.kind == "charuco":
@@ -219,11 +219,11 @@ def one(task: Task) -> Run:
     guess = start(true)
     fit = fit_joint(guess, views, unknowns_of(guess), Noise(0.2, 3e-4, 3e-4))
     seconds = time.process_time() - began
-    state = walk(fit.model, views, flange_error=fit.flange_error)
+    state = evaluate(fit.model, views, flange_error=fit.flange_error)
     free = fit_free_poses(
         state.optics, state.camera_from_board, state.points_m, views.corners_px, ()
     )
-    truth = walk(true, exact)
+    truth = evaluate(true, exact)
     alpha = COLUMN["alpha_px"]
     alpha_error = state.optics[:, alpha] - truth.optics[:, alpha]
     return Run(
@@ -236,7 +236,7 @@ def one(task: Task) -> Run:
     )
 
 
-def depth_rms_m(camera_from_board: FloatArray, truth: Walk) -> float:
+def depth_rms_m(camera_from_board: FloatArray, truth: ChainState) -> float:
     """Of the board's middle along the optical axis."""
     off = (camera_from_board - truth.camera_from_board)[:, 2]
     depth = off[:, :3] @ truth.points_m.mean(axis=0) + off[:, 3]

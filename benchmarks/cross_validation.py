@@ -29,7 +29,7 @@ from multiprocessing import Pool
 import numpy as np
 
 from calib.calibration.cross_validation import cross_validate
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.chain.rigid import from_vector
 from calib.solver.joint import fit_joint
 from calib.solver.noise import Noise, profile
@@ -84,7 +84,7 @@ def one(task: tuple[str, int]) -> Run:
     rng = np.random.default_rng(seed)
     views = views.take(rng.permutation(len(views)))
     views = replace(views, frame=np.arange(len(views)))
-    distance = walk(true, views).distance_m
+    distance = evaluate(true, views).distance_m
     nearest = int(distance.argmin())
     views = spoilt(case, views, nearest, rng)
     guess = start(true)

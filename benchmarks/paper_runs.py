@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from calib.calibration import Calibration, Solution, Statistics, calibrate
 from calib.calibration.baseline import as_solution, unfitted_solution
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.chain.rigid import inverse
 from calib.handeye import camera_position_error_m
 from calib.paper.fixed_alpha import FREE, algebraic_poses, fit_fixed_alpha, held_optics
@@ -182,7 +182,7 @@ def run(cell: SimulatedCell, plan: Plan) -> Run:
     }
     for name in ("fixed_alpha_algebraic", "fixed_alpha_mle", "joint_ml"):
         solutions[name] = part_of(whole.solutions[name], general)
-    truth = walk(cell.model, picked).camera_from_board
+    truth = evaluate(cell.model, picked).camera_from_board
     return Run(whole, solutions, truth, int((~general).sum()), alpha0)
 
 

@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from calib.chain import rigid
-from calib.chain.model import CellModel, walk
-from calib.chain.walk import Walk
+from calib.chain.model import CellModel, evaluate
+from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 from drivers.camera import FocusSetting, Frame
 from drivers.errors import DeviceRefused, DeviceUnreachable, FrameLost
@@ -185,7 +185,7 @@ class SimCamera:
 
     def _distance_m(self) -> float:
         """Depth of the board's centre as the arm stands now."""
-        return float(self._walk([self._seen_now()])[1].distance_m[-1])
+        return float(self._evaluate([self._seen_now()])[1].distance_m[-1])
 
     def _seen_now(self) -> tuple[Row, FloatArray]:
         """The arm as it stands, and its flange's error."""
@@ -201,21 +201,23 @@ class SimCamera:
             self._exposure_s,
         )
 
-    def _walk(self, more: list[tuple[Row, FloatArray]]) -> tuple[Views, Walk]:
+    def _evaluate(self, more: list[tuple[Row, FloatArray]]) -> tuple[Views, ChainState]:
         """The chain over every frame so far and `more`."""
         seen = [*self._seen, *more]
         views = views_of(self._cell, [row for row, _ in seen])
         errors = np.array([error for _, error in seen])
-        return views, walk(self._cell.model, views, flange_error=errors)
+        return views, evaluate(self._cell.model, views, flange_error=errors)
 
-    def _look(self, more: list[tuple[Row, FloatArray]] | None = None) -> tuple[Walk, FloatArray]:
-        views, state = self._walk(more or [])
+    def _look(
+        self, more: list[tuple[Row, FloatArray]] | None = None
+    ) -> tuple[ChainState, FloatArray]:
+        views, state = self._evaluate(more or [])
         focus = self._focus_distance_m
         if focus is None or abs(focus - state.distance_m[-1]) < 1e-6:
             return state, state.optics[-1]
         return state, optics_focused_at(self._cell.model, views, state, focus)
 
-    def _picture(self, state: Walk, optics: FloatArray) -> Image:
+    def _picture(self, state: ChainState, optics: FloatArray) -> Image:
         spec = self._cell.camera
         focus = self._focus_distance_m or float(state.distance_m[-1])
         pose = state.camera_from_board[-1]
@@ -261,7 +263,7 @@ class SimCamera:
 
 
 def optics_focused_at(
-    model: CellModel, views: Views, state: Walk, focus_distance_m: float
+    model: CellModel, views: Views, state: ChainState, focus_distance_m: float
 ) -> FloatArray:
     """(K,) optics of the last frame with the lens focused elsewhere than on the board.
 
@@ -276,7 +278,7 @@ def optics_focused_at(
     else:
         flange_from_base = rigid.inverse(state.base_from_flange[-1])
         moved = replace(model, flange_from_mounted=flange_from_base @ base_from_board)
-    return np.asarray(walk(moved, views).optics[-1])
+    return np.asarray(evaluate(moved, views).optics[-1])
 
 
 def _within(name: str, value: float, bounds: tuple[float, float]) -> float:

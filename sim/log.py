@@ -1,4 +1,4 @@
-"""What a simulated cell logs, as the views that the chain walks."""
+"""What a simulated cell logs, as the views that the chain takes."""
 
 from __future__ import annotations
 

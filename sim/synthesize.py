@@ -1,4 +1,4 @@
-"""Corners without pictures: the chain walked forward, plus scatter of arm and detector."""
+"""Corners without pictures: the chain evaluated forward, plus scatter of arm and detector."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.chain.projection import project
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import BoolArray, FloatArray, Views
 from sim.arm import Repeatability
 from sim.cell import ARM_STREAM, CORNER_STREAM, SimulatedCell
@@ -67,7 +67,7 @@ def synthesize_corners(
         Whether the camera tells what distance it is focused at.
     """
     errors = repeatability.draw(arm_rng, (len(log),))
-    state = walk(model, log, flange_error=errors)
+    state = evaluate(model, log, flange_error=errors)
     corners = project(state.optics, state.camera_from_board, state.points_m)
     corners += corner_sigma_px * corner_rng.standard_normal(corners.shape)
     corners[~_visible(state, corners, log)] = np.nan
@@ -77,11 +77,11 @@ def synthesize_corners(
 
 def true_corners(cell: SimulatedCell, log: Views) -> FloatArray:
     """(N, M, 2) pixels without any scatter, in the picture or not."""
-    state = walk(cell.model, log)
+    state = evaluate(cell.model, log)
     return project(state.optics, state.camera_from_board, state.points_m)
 
 
-def _visible(state: Walk, corners_px: FloatArray, log: Views) -> BoolArray:
+def _visible(state: ChainState, corners_px: FloatArray, log: Views) -> BoolArray:
     """(N, M) corners in front of the camera, on the printed side, inside the picture."""
     pose = state.camera_from_board
     depth = pose[:, None, 2, :3] @ state.points_m.T + pose[:, 2, 3, None, None]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.chain.optics import COLUMN
 from calib.solver.free_poses import FreePoseFit, fit_free_poses
 from calib.solver.joint import JointFit, fit_joint
@@ -44,7 +44,7 @@ class _Pictures:
     """The pictures of a joint fit, each with a free pose, and what a choice of terms costs them."""
 
     def __init__(self, joint: JointFit, views: Views) -> None:
-        self.state = walk(joint.model, views, flange_error=joint.flange_error)
+        self.state = evaluate(joint.model, views, flange_error=joint.flange_error)
         self.corners_px, self.weight = views.corners_px, joint.weight
         self.observations = 2.0 * float((joint.weight > 0.0).sum())
 

@@ -15,7 +15,7 @@ from calib.calibration.held_out_check import vindicated
 from calib.calibration.joint_lens import with_deserved_terms
 from calib.calibration.result import VALUES, RobotReference
 from calib.chain.effects import make_effect
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.chain.optics import COLUMN
 from calib.errors import CalibrationError
 from calib.handeye import HandEye, solve_hand_eye
@@ -187,7 +187,7 @@ def _arm_is_true(fit: JointFit) -> bool:
 
 def _picture_cost(fit: JointFit, still: JointFit, views: Views) -> float:
     """-2 log likelihood of the pictures alone: poses and camera free, the law's shape held."""
-    state = walk(fit.model, views, flange_error=fit.flange_error)
+    state = evaluate(fit.model, views, flange_error=fit.flange_error)
     free = fit_free_poses(
         state.optics,
         state.camera_from_board,

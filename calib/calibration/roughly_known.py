@@ -14,7 +14,7 @@ import numpy as np
 
 from calib.chain import rigid
 from calib.chain.effects import make_effect
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.chain.optics import COLUMN, optics_row
 from calib.paper.extrinsics import board_poses
 from calib.paper.homography import fit_homography
@@ -129,7 +129,7 @@ def _prior_sigma(guess: CellModel, views: Views, doubt: Doubt) -> dict[str, floa
     }
     sigma |= {f"flange_from_mounted.{axis}": doubt.mounted_m for axis in "xyz"}
     sigma |= {f"flange_from_mounted.r{axis}": doubt.mounted_rad for axis in "xyz"}
-    distance_m = float(walk(guess, views).distance_m[0])
+    distance_m = float(evaluate(guess, views).distance_m[0])
     breathing = _BREATHING_SHARE * alpha_px * distance_m**2
     return sigma | {f"{e.effect.label}.k_px_m2": breathing for e in guess.effects}
 

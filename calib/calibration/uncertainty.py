@@ -16,7 +16,7 @@ import numpy as np
 
 from calib.calibration.simulated_views import views_that_see
 from calib.chain import rigid
-from calib.chain.model import CellModel, predict, walk
+from calib.chain.model import CellModel, evaluate, predict
 from calib.chain.optics import COLUMN
 from calib.chain.projection import project_with_jacobians
 from calib.solver.unknowns import Unknown, moved
@@ -195,7 +195,7 @@ def optics_at(model: CellModel, views: Views, distance_m: float) -> FloatArray:
     """(K,) of the camera focused at a distance; of the views only size, board, mount count."""
     ahead = rigid.compose(np.zeros((1, 3)), np.array([[0.0, 0.0, distance_m]]))
     shown = views_that_see(model, views, views.board, ahead, distance_m)
-    return np.asarray(walk(model, shown).optics[0])
+    return np.asarray(evaluate(model, shown).optics[0])
 
 
 def _shown(
@@ -233,7 +233,7 @@ def _change(joint: Estimate, told: Callable[[CellModel], FloatArray], by: BoolAr
 
 def _change_of_place(joint: Estimate, shown: Views) -> FloatArray:
     """(F, 3, 2M) of the part's middle, camera's axes, when the predicted pixels change."""
-    state = walk(joint.model, shown)
+    state = evaluate(joint.model, shown)
     _, by_pose, _ = project_with_jacobians(state.optics, state.camera_from_board, state.points_m)
     middle = state.points_m.mean(axis=0)
     at = state.camera_from_board[:, :3, :3] @ middle + state.camera_from_board[:, :3, 3]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.chain import rigid
-from calib.chain.walk import DOWN_IN_BASE, Walk
+from calib.chain.state import DOWN_IN_BASE, ChainState
 from calib.views import FloatArray, Views
 
 
@@ -21,7 +21,7 @@ class Covariate:
     name, unit:
         As told to the reader.
     of:
-        (N,) or (N, D) values from the walk; NaN where not known.
+        (N,) or (N, D) values from the state; NaN where not known.
     cyclic:
         An angle whose full turn comes back to itself.
     two_sided:
@@ -30,88 +30,88 @@ class Covariate:
 
     name: str
     unit: str
-    of: Callable[[Walk], FloatArray]
+    of: Callable[[ChainState], FloatArray]
     cyclic: bool = False
     two_sided: bool = False
 
 
-def _logged(column: str) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.asarray(getattr(walk.views, column))
+def _logged(column: str) -> Callable[[ChainState], FloatArray]:
+    return lambda state: np.asarray(getattr(state.views, column))
 
 
-def _logged_joint(column: str, index: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.asarray(getattr(walk.views, column)[:, index])
+def _logged_joint(column: str, index: int) -> Callable[[ChainState], FloatArray]:
+    return lambda state: np.asarray(getattr(state.views, column)[:, index])
 
 
-def _approach(index: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.sign(
-        walk.views.joints_rad[:, index] - walk.views.approach_joints_rad[:, index]
+def _approach(index: int) -> Callable[[ChainState], FloatArray]:
+    return lambda state: np.sign(
+        state.views.joints_rad[:, index] - state.views.approach_joints_rad[:, index]
     )
 
 
-def _nominal_distance(walk: Walk) -> FloatArray:
-    if walk.camera_from_board.size:
-        return walk.distance_m
-    pose = rigid.inverse(walk.base_from_camera) @ walk.base_from_board
-    return np.asarray(pose[:, 2, :3] @ walk.points_m.mean(axis=0) + pose[:, 2, 3])
+def _nominal_distance(state: ChainState) -> FloatArray:
+    if state.camera_from_board.size:
+        return state.distance_m
+    pose = rigid.inverse(state.base_from_camera) @ state.base_from_board
+    return np.asarray(pose[:, 2, :3] @ state.points_m.mean(axis=0) + pose[:, 2, 3])
 
 
-def _tilt(walk: Walk) -> FloatArray:
-    pose = rigid.inverse(walk.base_from_camera) @ walk.base_from_board
+def _tilt(state: ChainState) -> FloatArray:
+    pose = rigid.inverse(state.base_from_camera) @ state.base_from_board
     return np.asarray(np.arccos(np.clip(np.abs(pose[:, 2, 2]), 0.0, 1.0)))
 
 
-def _gravity(walk: Walk) -> FloatArray:
-    return walk.gravity_in_camera()
+def _gravity(state: ChainState) -> FloatArray:
+    return state.gravity_in_camera()
 
 
-def _gravity_along(axis: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.asarray(walk.base_from_camera[:, :3, axis] @ DOWN_IN_BASE)
+def _gravity_along(axis: int) -> Callable[[ChainState], FloatArray]:
+    return lambda state: np.asarray(state.base_from_camera[:, :3, axis] @ DOWN_IN_BASE)
 
 
-def _torques_nm(walk: Walk) -> FloatArray:
-    arm, views = walk.arm, walk.views
+def _torques_nm(state: ChainState) -> FloatArray:
+    arm, views = state.arm, state.views
     if arm is None:
         return np.full((len(views), 6), np.nan)
-    return walk.once(
+    return state.once(
         "gravity_torques_nm",
         lambda: arm.gravity_torques(views.joints_rad, views.payload_kg or 0.0),
     )
 
 
-def _moment(axis: int) -> Callable[[Walk], FloatArray]:
-    def of(walk: Walk) -> FloatArray:
-        arm, views = walk.arm, walk.views
+def _moment(axis: int) -> Callable[[ChainState], FloatArray]:
+    def of(state: ChainState) -> FloatArray:
+        arm, views = state.arm, state.views
         if arm is None:
             return np.full(len(views), np.nan)
         load_kg = views.payload_kg or 0.0
-        moment = walk.once("base_moment_Nm", lambda: arm.base_moment(views.joints_rad, load_kg))
+        moment = state.once("base_moment_Nm", lambda: arm.base_moment(views.joints_rad, load_kg))
         return np.asarray(moment[:, axis])
 
     return of
 
 
-def _load(index: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.asarray(_torques_nm(walk)[:, index])
+def _load(index: int) -> Callable[[ChainState], FloatArray]:
+    return lambda state: np.asarray(_torques_nm(state)[:, index])
 
 
-def _load_side(index: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.sign(_torques_nm(walk)[:, index])
+def _load_side(index: int) -> Callable[[ChainState], FloatArray]:
+    return lambda state: np.sign(_torques_nm(state)[:, index])
 
 
-def _position(axis: int) -> Callable[[Walk], FloatArray]:
-    return lambda walk: np.asarray(walk.views.base_from_flange[:, axis, 3])
+def _position(axis: int) -> Callable[[ChainState], FloatArray]:
+    return lambda state: np.asarray(state.views.base_from_flange[:, axis, 3])
 
 
-def _reach(walk: Walk) -> FloatArray:
-    return np.asarray(np.linalg.norm(walk.views.base_from_flange[:, :2, 3], axis=1))
+def _reach(state: ChainState) -> FloatArray:
+    return np.asarray(np.linalg.norm(state.views.base_from_flange[:, :2, 3], axis=1))
 
 
 COVARIATES: tuple[Covariate, ...] = (
     Covariate("distance", "m", _nominal_distance),
     Covariate("tilt", "rad", _tilt),
     Covariate("time", "s", _logged("t_s")),
-    Covariate("order", "frame", lambda walk: walk.views.frame.astype(np.float64)),
+    Covariate("order", "frame", lambda state: state.views.frame.astype(np.float64)),
     Covariate("gravity", "g", _gravity),
     Covariate("temperature", "degC", _logged("temperature_c")),
     Covariate("focus_position", "steps", _logged("focus_position")),
@@ -127,7 +127,7 @@ COVARIATES: tuple[Covariate, ...] = (
 DERIVED: tuple[Covariate, ...] = (
     Covariate("exposure", "s", _logged("exposure_s")),
     Covariate("focus_distance", "m", _logged("focus_distance_m")),
-    Covariate("inverse_distance", "1/m", lambda walk: 1.0 / _nominal_distance(walk)),
+    Covariate("inverse_distance", "1/m", lambda state: 1.0 / _nominal_distance(state)),
     Covariate("blur", "px", _logged("blur_px")),
     *(Covariate(f"gravity_{axis}", "g", _gravity_along(k)) for k, axis in enumerate("xyz")),
     *(Covariate(f"load_{k + 1}", "Nm", _load(k)) for k in range(1, 5)),
@@ -138,7 +138,7 @@ DERIVED: tuple[Covariate, ...] = (
 )
 """Those that only laws of few numbers are looked for along."""
 
-CONSTANT = Covariate("constant", "1", lambda walk: np.ones((len(walk.views), 1)))
+CONSTANT = Covariate("constant", "1", lambda state: np.ones((len(state.views), 1)))
 """The same in every frame: one column for each number of a site."""
 
 _UNITS = {
@@ -171,18 +171,18 @@ def _unit_of(key: str) -> str:
 
 
 def _extra(key: str) -> Covariate:
-    def of(walk: Walk) -> FloatArray:
-        column = walk.views.extra.get(key)
-        return np.full(len(walk.views), np.nan) if column is None else column
+    def of(state: ChainState) -> FloatArray:
+        column = state.views.extra.get(key)
+        return np.full(len(state.views), np.nan) if column is None else column
 
     return Covariate(key, _unit_of(key), of)
 
 
 def _label(key: str, word: str) -> Covariate:
-    def of(walk: Walk) -> FloatArray:
-        column = walk.views.labels.get(key)
+    def of(state: ChainState) -> FloatArray:
+        column = state.views.labels.get(key)
         if column is None:
-            return np.full(len(walk.views), np.nan)
+            return np.full(len(state.views), np.nan)
         return np.where(column == "", np.nan, (column == word).astype(np.float64))
 
     return Covariate(f"{key}={word}", "1", of)

@@ -11,7 +11,7 @@ import numpy as np
 from calib.views import FloatArray, Views
 
 if TYPE_CHECKING:
-    from calib.chain.walk import Walk
+    from calib.chain.state import ChainState
 
 Link = Literal["clock", "arm", "mount", "board", "lens", "sensor", "detector"]
 Role = Literal["amount", "shape", "setting"]
@@ -72,7 +72,7 @@ class Effect:
     parameters:
         Its numbers.
     act:
-        Changes the walk, given the parameters' values in their order.
+        Changes the state, given the parameters' values in their order.
     needs:
         Columns of `Views` that must have been logged.
     needs_variation:
@@ -102,7 +102,7 @@ class Effect:
     equation: str
     source: str
     parameters: tuple[Parameter, ...]
-    act: Callable[[FloatArray, Walk], None]
+    act: Callable[[FloatArray, ChainState], None]
     remedy: str
     law: str | None = None
     needs: tuple[str, ...] = ()

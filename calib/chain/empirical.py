@@ -15,7 +15,7 @@ from numpy.polynomial.legendre import legvander
 from calib.chain import rigid
 from calib.chain.covariates import CONSTANT, Covariate, covariate_named
 from calib.chain.effect import Effect, Link, Parameter, Present
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 
 UNNAMED = "empirical"
@@ -40,49 +40,49 @@ class Site:
     components:
         (name, unit, typical size) of each number.
     shift:
-        Applies (N, D) amounts to the walk.
+        Applies (N, D) amounts to the state.
     """
 
     name: str
     link: Link
     acts_in: Link
     components: tuple[tuple[str, str, float], ...]
-    shift: Callable[[FloatArray, Walk], None]
+    shift: Callable[[FloatArray, ChainState], None]
 
 
 def _joint(index: int) -> Site:
-    def shift(amount: FloatArray, walk: Walk) -> None:
-        walk.joints_rad = walk.joints_rad.copy()
-        walk.joints_rad[:, index] += amount[:, 0]
+    def shift(amount: FloatArray, state: ChainState) -> None:
+        state.joints_rad = state.joints_rad.copy()
+        state.joints_rad[:, index] += amount[:, 0]
 
     name = f"joint_{index + 1}"
     return Site(name, "arm", "arm", ((name, "rad", 3e-4),), shift)
 
 
-def _flange(amount: FloatArray, walk: Walk) -> None:
-    walk.base_from_flange = walk.base_from_flange @ rigid.from_vector(amount)
+def _flange(amount: FloatArray, state: ChainState) -> None:
+    state.base_from_flange = state.base_from_flange @ rigid.from_vector(amount)
 
 
-def _mounted(amount: FloatArray, walk: Walk) -> None:
-    walk.flange_from_mounted = walk.flange_from_mounted @ rigid.from_vector(amount)
+def _mounted(amount: FloatArray, state: ChainState) -> None:
+    state.flange_from_mounted = state.flange_from_mounted @ rigid.from_vector(amount)
 
 
-def _fixed(amount: FloatArray, walk: Walk) -> None:
-    walk.base_from_fixed = walk.base_from_fixed @ rigid.from_vector(amount)
+def _fixed(amount: FloatArray, state: ChainState) -> None:
+    state.base_from_fixed = state.base_from_fixed @ rigid.from_vector(amount)
 
 
-def _focal(amount: FloatArray, walk: Walk) -> None:
-    walk.column("alpha_px")[:] *= 1.0 + amount[:, 0]
-    walk.column("beta_px")[:] *= 1.0 + amount[:, 0]
+def _focal(amount: FloatArray, state: ChainState) -> None:
+    state.column("alpha_px")[:] *= 1.0 + amount[:, 0]
+    state.column("beta_px")[:] *= 1.0 + amount[:, 0]
 
 
-def _principal(amount: FloatArray, walk: Walk) -> None:
-    walk.column("u0_px")[:] += amount[:, 0]
-    walk.column("v0_px")[:] += amount[:, 1]
+def _principal(amount: FloatArray, state: ChainState) -> None:
+    state.column("u0_px")[:] += amount[:, 0]
+    state.column("v0_px")[:] += amount[:, 1]
 
 
-def _radial(amount: FloatArray, walk: Walk) -> None:
-    walk.column("k1")[:] += amount[:, 0]
+def _radial(amount: FloatArray, state: ChainState) -> None:
+    state.column("k1")[:] += amount[:, 0]
 
 
 _RIGID = tuple(
@@ -156,20 +156,20 @@ class Curve:
         stiff = self.covariate.two_sided or self.covariate.name == "gravity"
         return not (self.fine or stiff or self.period is not None)
 
-    def functions(self, walk: Walk) -> FloatArray:
+    def functions(self, state: ChainState) -> FloatArray:
         """(N, B) of the curve's functions."""
-        value = self.covariate.of(walk)
+        value = self.covariate.of(state)
         if self.period is not None:
             return wave(value, self.period)
         return basis(self.covariate, value, self.low, self.high, FINE if self.fine else 1)
 
-    def carried(self, walk: Walk) -> FloatArray:
+    def carried(self, state: ChainState) -> FloatArray:
         """(N, B) of the functions that carry the curve in a cell.
 
         A joint between the first and the last has a constant of its own that neither mount nor
         board absorbs: a curve that only starts at some angle has one, too.
         """
-        functions = self.functions(walk)
+        functions = self.functions(state)
         if not self.has_own_constant:
             return functions
         return np.concatenate([functions, np.ones((len(functions), 1))], axis=1)
@@ -200,12 +200,12 @@ def empirical(curve: Curve, functions: int) -> Effect:
     site = curve.site
     amount_count = functions * len(site.components)
 
-    def act(values: FloatArray, walk: Walk) -> None:
+    def act(values: FloatArray, state: ChainState) -> None:
         coefficients = values[:amount_count]
         if not coefficients.any():
             return
-        amounts = curve.carried(walk) @ coefficients.reshape(functions, len(site.components))
-        site.shift(amounts, walk)
+        amounts = curve.carried(state) @ coefficients.reshape(functions, len(site.components))
+        site.shift(amounts, state)
 
     return Effect(
         name=UNNAMED,
@@ -265,9 +265,9 @@ def span(values: FloatArray) -> tuple[float, float]:
     return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
 
 
-def present_curve(curve: Curve, walk: Walk) -> Present:
-    """The curve as an effect with all amounts zero, sized for this walk."""
-    effect = empirical(curve, curve.carried(walk).shape[1])
+def present_curve(curve: Curve, state: ChainState) -> Present:
+    """The curve as an effect with all amounts zero, sized for these frames."""
+    effect = empirical(curve, curve.carried(state).shape[1])
     return Present(effect, effect.values({}))
 
 

@@ -1,4 +1,4 @@
-"""A cell as the chain sees it, and the walk along its links."""
+"""A cell as the chain sees it, and its evaluation link by link."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from calib.chain import rigid
 from calib.chain.effect import LINKS, Link, Present
 from calib.chain.kinematics import ArmKinematics, arm
 from calib.chain.projection import project
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 
 
@@ -29,7 +29,7 @@ class CellModel:
     base_from_fixed:
         (4, 4) base_from_board for an eye in hand, base_from_camera else.
     effects:
-        What departs from the plain chain, in any order; the walk sorts them by link.
+        What departs from the plain chain, in any order; they are sorted by link.
     corner_offsets_m:
         (M, 3) where the printed corners lie off their grid, or None.
     """
@@ -52,13 +52,13 @@ def kinematics_of(views: Views) -> ArmKinematics | None:
     return arm(views.robot_model)
 
 
-def start(model: CellModel, views: Views, kinematics: ArmKinematics | None) -> Walk:
-    """The walk before its first link: everything as logged and nominal."""
+def start(model: CellModel, views: Views, kinematics: ArmKinematics | None) -> ChainState:
+    """The state before the first link: everything as logged and nominal."""
     n = len(views)
     points = views.board.corners_m
     if model.corner_offsets_m is not None:
         points = points + model.corner_offsets_m
-    return Walk(
+    return ChainState(
         views=views,
         arm=kinematics,
         joints_rad=views.joints_rad,
@@ -70,12 +70,12 @@ def start(model: CellModel, views: Views, kinematics: ArmKinematics | None) -> W
     )
 
 
-Stop = int | Literal["arm", "place", "focus"]
-"""A place on the walk's way: an effect by its index, or what the chain itself does there."""
+Stage = int | Literal["arm", "place", "focus"]
+"""A stage of the evaluation: an effect by its index, or what the chain itself does there."""
 
 
-def route(model: CellModel) -> tuple[Stop, ...]:
-    """The stops of a walk in their order: effects by link, the arm after its own, then the pose.
+def stages(model: CellModel) -> tuple[Stage, ...]:
+    """The stages in their order: effects by link, the arm after its own, then the pose.
 
     The focal length's own error comes last: it is about what the lens does, whatever that is.
     """
@@ -102,36 +102,36 @@ class Errors:
     focal: FloatArray | None = None
 
 
-def _call_at(walk: Walk, stop: Stop, model: CellModel, errors: Errors) -> None:
-    if stop == "place":
-        walk.place()
-    elif stop == "focus":
+def _call_at(evaluate: ChainState, stage: Stage, model: CellModel, errors: Errors) -> None:
+    if stage == "place":
+        evaluate.place()
+    elif stage == "focus":
         if errors.focal is not None:
             for name in ("alpha_px", "beta_px"):
-                walk.column(name)[:] *= 1.0 + errors.focal
-    elif stop == "arm":
-        walk.move_arm()
+                evaluate.column(name)[:] *= 1.0 + errors.focal
+    elif stage == "arm":
+        evaluate.move_arm()
         if errors.flange is not None:
             error = rigid.from_vector(errors.flange)
-            walk.base_from_flange = rigid.product(walk.base_from_flange, error)
+            evaluate.base_from_flange = rigid.product(evaluate.base_from_flange, error)
     else:
-        present = model.effects[stop]
+        present = model.effects[stage]
         if not present.absent:
-            present.effect.act(present.values, walk)
+            present.effect.act(present.values, evaluate)
 
 
-class Journey:
-    """A walk that can be taken again from any of its stops, with some constants changed.
+class StagedEvaluation:
+    """An evaluation that can be resumed from any of its stages, with some constants changed.
 
-    Before a stop nothing depends on what enters there: the arm need not be worked out anew for
+    Before a stage nothing depends on what enters there: the arm need not be worked out anew for
     every number of the lens.
 
     Attributes
     ----------
     state:
-        The walk at its end.
+        The state at the end.
     placed:
-        The stop from which on the pose in the camera stays.
+        The stage from which on the pose in the camera stays.
     """
 
     def __init__(
@@ -144,26 +144,26 @@ class Journey:
         focal_error: FloatArray | None = None,
     ) -> None:
         self.state = start(model, views, kinematics or kinematics_of(views))
-        self._model, self._route = model, route(model)
+        self._model, self._stages = model, stages(model)
         self._errors = Errors(flange_error, focal_error)
-        self._before: list[Walk] = []
-        for stop in self._route:
+        self._before: list[ChainState] = []
+        for stage in self._stages:
             self._before.append(self.state.copy())
-            _call_at(self.state, stop, model, self._errors)
+            _call_at(self.state, stage, model, self._errors)
         self._before.append(self.state)
-        self.placed = self._route.index("place") + 1
+        self.placed = self._stages.index("place") + 1
         ahead = any(present.effect.looks_ahead for present in model.effects)
-        self._poses = 0 if ahead else self._route.index("arm")
+        self._poses = 0 if ahead else self._stages.index("arm")
 
     def entry(self, place: tuple[str, int, int]) -> int:
-        """The stop at which a number, named as in `Unknown.place`, is first looked at."""
+        """The stage at which a number, named as in `Unknown.place`, is first looked at."""
         kind, at, _ = place
         if kind == "optics":
             return self.placed
-        return self._route.index(at) if kind == "effect" else self._poses
+        return self._stages.index(at) if kind == "effect" else self._poses
 
-    def again(self, changed: CellModel, first: int) -> Walk:
-        """The walk of a cell that differs only in what enters at stop `first` or later."""
+    def from_stage(self, changed: CellModel, first: int) -> ChainState:
+        """The state of a cell that differs only in what enters at stage `first` or later."""
         state = self._before[first].copy()
         n = len(state.views)
         if first <= self._poses:
@@ -173,28 +173,28 @@ class Journey:
             state.optics = np.repeat(changed.optics[None], n, axis=0)
         return self._on(state, changed, first)
 
-    def nudged(self, step: FloatArray) -> Walk:
-        """The walk with every flange off by a (6,) increment more, in its own frame."""
-        first = self._route.index("arm") + 1
+    def nudged(self, step: FloatArray) -> ChainState:
+        """The state with every flange off by a (6,) increment more, in its own frame."""
+        first = self._stages.index("arm") + 1
         state = self._before[first].copy()
         state.base_from_flange = rigid.product(state.base_from_flange, rigid.from_vector(step))
         return self._on(state, self._model, first)
 
-    def _on(self, state: Walk, model: CellModel, first: int) -> Walk:
-        for stop in self._route[first:]:
-            _call_at(state, stop, model, self._errors)
+    def _on(self, state: ChainState, model: CellModel, first: int) -> ChainState:
+        for stage in self._stages[first:]:
+            _call_at(state, stage, model, self._errors)
         return state
 
 
-def walk(
+def evaluate(
     model: CellModel,
     views: Views,
     *,
     kinematics: ArmKinematics | None = None,
     flange_error: FloatArray | None = None,
     focal_error: FloatArray | None = None,
-) -> Walk:
-    """Walk the chain for every logged frame.
+) -> ChainState:
+    """ChainState the chain for every logged frame.
 
     Parameters
     ----------
@@ -210,11 +210,11 @@ def walk(
 
     Returns
     -------
-    The walk with `optics`, `camera_from_board` and `points_m` as the sensor sees them.
+    The state with `optics`, `camera_from_board` and `points_m` as the sensor sees them.
     """
     state = start(model, views, kinematics or kinematics_of(views))
-    for stop in route(model):
-        _call_at(state, stop, model, Errors(flange_error, focal_error))
+    for stage in stages(model):
+        _call_at(state, stage, model, Errors(flange_error, focal_error))
     return state
 
 
@@ -222,5 +222,5 @@ def predict(
     model: CellModel, views: Views, *, flange_error: FloatArray | None = None
 ) -> FloatArray:
     """(N, M, 2) pixels at which this cell shows the corners at the logged poses."""
-    state = walk(model, views, flange_error=flange_error)
+    state = evaluate(model, views, flange_error=flange_error)
     return project(state.optics, state.camera_from_board, state.points_m)

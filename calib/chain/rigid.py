@@ -1,6 +1,6 @@
 """Rigid transforms as (..., 4, 4) arrays, for the loops where thousands are handled at once.
 
-Compiled, since a linearised chain is a hundred walks and most of a walk is products of these:
+Compiled, since a linearised chain is a hundred evaluations and most of one is products of these:
 numpy's own product of stacked 4 x 4 matrices takes six times as long.
 """
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.chain.effect import Present
 from calib.chain.empirical import UNNAMED
-from calib.chain.model import kinematics_of, walk
+from calib.chain.model import evaluate, kinematics_of
 from calib.discovery.ambiguity import ambiguities, ambiguous_mixups
 from calib.discovery.candidates import unseen
 from calib.discovery.diagnosis import (
@@ -37,7 +37,7 @@ from calib.discovery.search import UNDECIDED, Search
 from calib.discovery.split import split_misfit
 from calib.discovery.start import Fitter, fit_start
 from calib.distributions import chi2_tail
-from calib.solver.joint import JointFit, walked
+from calib.solver.joint import JointFit, frame_errors
 from calib.solver.noise import Noise, profile
 from calib.views import BoolArray, Views
 
@@ -323,7 +323,7 @@ def _excess(fit: JointFit) -> float:
 
 
 def _pictures(twin: JointFit, views: Views) -> tuple[str, ...]:
-    state = walk(twin.model, views, **walked(twin.own_error))
+    state = evaluate(twin.model, views, **frame_errors(twin.own_error))
     return told_of(fit_blur(views.blur_px, state.distance_m))
 
 

@@ -20,11 +20,11 @@ from calib.chain.empirical import (
     site_columns,
     span,
 )
-from calib.chain.model import walk
-from calib.chain.walk import Walk
+from calib.chain.model import evaluate
+from calib.chain.state import ChainState
 from calib.discovery.fields import field_scores
 from calib.discovery.score import Score, conditional, extended, group_score
-from calib.solver.joint import JointFit, assemble, walked
+from calib.solver.joint import JointFit, assemble, frame_errors
 from calib.solver.unknowns import amounts, prior_information
 from calib.views import FloatArray, Views
 
@@ -80,7 +80,7 @@ def locate(fit: JointFit, views: Views, *, periods: bool = True) -> list[Cell]:
 
     Without `periods` in time where a law that swings was looked for already.
     """
-    state = walk(fit.model, views, **walked(fit.own_error))
+    state = evaluate(fit.model, views, **frame_errors(fit.own_error))
     probe = _Probe(fit, views, state)
     cells = [cell for covariate in COVARIATES for cell in probe.along(covariate)]
     if periods:
@@ -95,7 +95,7 @@ def locate(fit: JointFit, views: Views, *, periods: bool = True) -> list[Cell]:
 class _Probe:
     """One linearisation of every site, multiplied by whatever a covariate asks for."""
 
-    def __init__(self, fit: JointFit, views: Views, state: Walk) -> None:
+    def __init__(self, fit: JointFit, views: Views, state: ChainState) -> None:
         self.fit, self.views, self.state = fit, views, state
         self.sites = site_columns(views)
         presents = [present_curve(Curve(s, CONSTANT, 0.0, 1.0), state) for s in self.sites]
@@ -167,7 +167,7 @@ class _Probe:
         ]
 
 
-def _where(curve: Curve, score: Score, state: Walk, site: Site) -> str:
+def _where(curve: Curve, score: Score, state: ChainState, site: Site) -> str:
     """Say in which range of the covariate the one-step curve departs most."""
     value = curve.covariate.of(state)
     if value.ndim == 2:

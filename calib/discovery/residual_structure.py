@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from calib.chain.empirical import present_curve
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.discovery.laws.arm_field import with_arm_field
 from calib.discovery.laws.contest import as_cell, demanded
 from calib.discovery.laws.review import drop_beside_kinematics, drop_unsupported, replaced_by_laws
@@ -120,7 +120,7 @@ def _carried_finer(search: Search, found: list[Cell], views: Views) -> bool:
     for known in found[:-1]:
         if known.site != site or known.curve is None or not known.curve.can_be_finer:
             continue
-        state = walk(search.best.fit.model, views)
+        state = evaluate(search.best.fit.model, views)
         finer = replace(known.curve, fine=True)
         smooth = present_curve(known.curve, state)
         if search.put_in(present_curve(finer, state), known.tried, instead_of=smooth):
@@ -133,7 +133,7 @@ def _carried_finer(search: Search, found: list[Cell], views: Views) -> bool:
 
 def _carry(search: Search, cell: Cell, views: Views) -> bool:
     assert cell.curve is not None
-    state = walk(search.best.fit.model, views)
+    state = evaluate(search.best.fit.model, views)
     if not search.put_in(present_curve(cell.curve, state), choices=cell.tried):
         return False
     search.run()

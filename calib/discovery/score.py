@@ -17,7 +17,7 @@ from calib.chain.effect import Present
 from calib.chain.model import kinematics_of
 from calib.distributions import f_tail
 from calib.solver.elimination import solve_scaled
-from calib.solver.joint import JointFit, assemble, walked
+from calib.solver.joint import JointFit, assemble, frame_errors
 from calib.solver.noise import JointEquations, scaled
 from calib.solver.unknowns import (
     Dependence,
@@ -113,7 +113,7 @@ def extended(
     amounts = amount_unknowns(model, fit.unknowns)
     unknowns = (*fit.unknowns, *amounts)
     found = dependence(
-        model, views, unknowns, kinematics=kinematics_of(views), **walked(fit.own_error)
+        model, views, unknowns, kinematics=kinematics_of(views), **frame_errors(fit.own_error)
     )
     shift = fit.equations.corner_shift if fit.equations.corner_numbers else None
     prior = (amounts_of(model, unknowns), prior_information(unknowns))

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.chain import rigid
 from calib.chain.kinematics import ArmKinematics
-from calib.chain.model import CellModel, kinematics_of, walk
+from calib.chain.model import CellModel, evaluate, kinematics_of
 from calib.chain.projection import project
 from calib.solver.accumulate import LocalEquations, local_equations
 from calib.solver.elimination import FrameEquations, joined, solve_scaled
@@ -33,15 +33,15 @@ BLOCK_FRAMES = 64
 """Frames whose products are at hand together: they stay in the cache, and memory stays small."""
 
 
-class Walked(TypedDict):
-    """A frame's own errors as the walk takes them."""
+class FrameErrors(TypedDict):
+    """A frame's own errors as `evaluate` takes them."""
 
     flange_error: FloatArray
     focal_error: FloatArray | None
 
 
-def walked(own_error: FloatArray) -> Walked:
-    """(N, 6) errors of the flange, or (N, 7) with that of the focal length, for the walk."""
+def frame_errors(own_error: FloatArray) -> FrameErrors:
+    """(N, 6) errors of the flange, or (N, 7) with that of the focal length, for `evaluate`."""
     focal = own_error[:, 6] if own_error.shape[1] > 6 else None
     return {"flange_error": own_error[:, :6], "focal_error": focal}
 
@@ -239,7 +239,7 @@ class _Iteration:
             self.views,
             self.unknowns,
             kinematics=self.arm,
-            **walked(self.state.own_error),
+            **frame_errors(self.state.own_error),
         )
         self.equations, self.residual = self._assemble(self.found, self.state)
 
@@ -250,7 +250,7 @@ class _Iteration:
 
     def cost(self, at: JointState) -> float:
         """Penalised square sum at that state, for the present weights."""
-        seen = walk(at.model, self.views, kinematics=self.arm, **walked(at.own_error))
+        seen = evaluate(at.model, self.views, kinematics=self.arm, **frame_errors(at.own_error))
         pixels = project(seen.optics, seen.camera_from_board, seen.points_m)
         square = np.nansum((self.views.corners_px - pixels) ** 2, axis=2)
         cost = float(np.sum(self.weight * square)) / at.noise.corner_px**2

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from calib.chain import rigid
 from calib.chain.effect import Parameter, Present
 from calib.chain.kinematics import ArmKinematics
-from calib.chain.model import CellModel, Journey
+from calib.chain.model import CellModel, StagedEvaluation
 from calib.chain.optics import COLUMN
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 
 _STEP_SHARE = 1e-4
@@ -158,7 +158,7 @@ class Dependence:
     Attributes
     ----------
     state:
-        The walk at the present values.
+        The state at the present values.
     active:
         Indices of the A optics columns that follow anything.
     modes:
@@ -171,7 +171,7 @@ class Dependence:
         follows it as well), and the focal length's where it has one.
     """
 
-    state: Walk
+    state: ChainState
     active: tuple[int, ...]
     modes: FloatArray
     local: FloatArray
@@ -192,14 +192,14 @@ def dependence(
     flange_error: FloatArray | None,
     focal_error: FloatArray | None = None,
 ) -> Dependence:
-    """Differentiate the walk by every free number (central differences, one walk a side)."""
-    journey = Journey(
+    """Differentiate the chain by every free number (central differences, one evaluation a side)."""
+    staged = StagedEvaluation(
         model, views, kinematics=kinematics, flange_error=flange_error, focal_error=focal_error
     )
-    columns = [_column(journey, model, unknown) for unknown in unknowns]
-    by_own = [_flange_column(journey, k) for k in range(6)]
+    columns = [_column(staged, model, unknown) for unknown in unknowns]
+    by_own = [_flange_column(staged, k) for k in range(6)]
     if focal_error is not None:
-        sides = journey.state.optics[:, _SIDES] / (1.0 + focal_error[:, None])
+        sides = staged.state.optics[:, _SIDES] / (1.0 + focal_error[:, None])
         by_own.append(_Column(np.array(_SIDES, dtype=np.int64), sides, None, None))
     n, p = len(views), len(unknowns)
     followed = np.zeros(len(model.optics), dtype=bool)
@@ -217,7 +217,7 @@ def dependence(
                 into[:, a : a + 6, k] = column.pose
     for b, k in enumerate(moving):
         local[:, a + 6 + b, k] = 1.0
-    state = journey.state
+    state = staged.state
     modes = np.array([columns[k].points for k in moving]).reshape(-1, *state.points_m.shape)
     return Dependence(state, tuple(int(c) for c in active), modes, local, own)
 
@@ -235,23 +235,23 @@ class _Column:
     points: FloatArray | None
 
 
-def _column(journey: Journey, model: CellModel, unknown: Unknown) -> _Column:
-    first = journey.entry(unknown.place)
+def _column(staged: StagedEvaluation, model: CellModel, unknown: Unknown) -> _Column:
+    first = staged.entry(unknown.place)
     step = np.array([unknown.typical * _STEP_SHARE])
     # bounds would halve the difference of a number that stands at one
-    plus = journey.again(moved(model, (unknown,), step, bounded=False), first)
-    minus = journey.again(moved(model, (unknown,), -step, bounded=False), first)
-    return _difference(journey, plus, minus, 0.5 / step[0], placed=first >= journey.placed)
+    plus = staged.from_stage(moved(model, (unknown,), step, bounded=False), first)
+    minus = staged.from_stage(moved(model, (unknown,), -step, bounded=False), first)
+    return _difference(staged, plus, minus, 0.5 / step[0], placed=first >= staged.placed)
 
 
-def _flange_column(journey: Journey, k: int) -> _Column:
+def _flange_column(staged: StagedEvaluation, k: int) -> _Column:
     step = _FLANGE_STEP * np.eye(6)[k]
-    plus, minus = journey.nudged(step), journey.nudged(-step)
-    return _difference(journey, plus, minus, 0.5 / _FLANGE_STEP, placed=False)
+    plus, minus = staged.nudged(step), staged.nudged(-step)
+    return _difference(staged, plus, minus, 0.5 / _FLANGE_STEP, placed=False)
 
 
 def _difference(
-    journey: Journey, plus: Walk, minus: Walk, scale: float, *, placed: bool
+    staged: StagedEvaluation, plus: ChainState, minus: ChainState, scale: float, *, placed: bool
 ) -> _Column:
     """`placed` where the number enters after the pose, which then stays."""
     optics = (plus.optics - minus.optics) * scale
@@ -260,7 +260,7 @@ def _difference(
     if placed:
         return _Column(followed, optics, None, None)
     rate = (plus.camera_from_board - minus.camera_from_board) * scale
-    back = rigid.inverse(journey.state.camera_from_board)
+    back = rigid.inverse(staged.state.camera_from_board)
     return _Column(
         followed,
         optics,

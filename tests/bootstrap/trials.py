@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.chain import rigid
 from calib.chain.kinematics import arm
-from calib.chain.model import CellModel, predict, walk
+from calib.chain.model import CellModel, evaluate, predict
 from calib.detection import Detection
 from calib.views import BoolArray, FloatArray, Views
 from cell.devices.simulated_cell import simulated_cell
@@ -218,7 +218,7 @@ def whole(cell: CellFile, joints_rad: FloatArray) -> BoolArray:
     poses = arm(cell.robot.model or "").forward(joints_rad)
     log = {"robot_model": cell.robot.model, "joints_rad": joints_rad, "base_from_flange": poses}
     views = replace(blank, **log)
-    state = walk(model, views)
+    state = evaluate(model, views)
     px = predict(model, views)
     border = (0.5 * board.square_m * state.optics[:, 0] / state.distance_m)[:, None, None]
     size = np.array([camera.width, camera.height])

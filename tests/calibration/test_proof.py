@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from calib.calibration import Statistics, calibrate
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.handeye import camera_position_error_m
 from cell.storage.files.plan_file import read_plan
 from sim.log import tour
@@ -20,7 +20,7 @@ def test_zhang_fits_well_and_is_centimetres_off_where_the_fixed_alpha_fit_is_rig
     joints = np.radians([view.joints_deg for view in read_plan(PLAN).file.views])
     log = tour(cell, joints)
     found = calibrate(synthesize(cell, log))
-    truth = walk(cell.model, log).camera_from_board
+    truth = evaluate(cell.model, log).camera_from_board
 
     def error(name: str) -> Statistics:
         poses = found.solutions[name].camera_from_board

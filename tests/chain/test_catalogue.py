@@ -8,7 +8,7 @@ import pytest
 
 from calib.chain.effect import LINKS, Effect, Present
 from calib.chain.effects import catalogue, find_effect, make_effect
-from calib.chain.model import predict, start, walk
+from calib.chain.model import evaluate, predict, start
 from calib.chain.optics import COLUMN
 from calib.views import Mount, Views
 from tests.chain.cells import cell
@@ -77,8 +77,8 @@ def test_without_amount_nothing_changes_and_with_it_pixels_do(label: str, mount:
     absent = _present(effect, views, 0.0)
     assert absent.absent
     assert np.array_equal(predict(model.with_effects([absent]), views), plain)
-    state = start(model, views, walk(model, views).arm)
-    state.camera_from_board = walk(model, views).camera_from_board
+    state = start(model, views, evaluate(model, views).arm)
+    state.camera_from_board = evaluate(model, views).camera_from_board
     before = state.optics.copy(), state.points_m.copy(), state.base_from_flange.copy()
     effect.act(absent.values, state)
     after = state.optics, state.points_m, state.base_from_flange

@@ -9,7 +9,7 @@ import numpy as np
 from calib.chain.covariates import covariate_named
 from calib.chain.effects import make_effect
 from calib.chain.empirical import Curve, present_curve, site_named
-from calib.chain.model import kinematics_of, walk
+from calib.chain.model import evaluate, kinematics_of
 from calib.discovery.fields import field_scores
 from calib.discovery.log_consistency.branches import Branches, choose_branches
 from calib.discovery.log_repair import repair_log
@@ -117,7 +117,7 @@ def beside_a_drag_of_the_wrist(sag_rad_per_Nm: float, decentering: float) -> lis
     ]
     low, high = LOG.joints_rad[:, 5].min(), LOG.joints_rad[:, 5].max()
     curve = Curve(site_named("joint_5"), covariate_named("joint_6"), low, high)
-    empty = present_curve(curve, walk(plain_cell(), LOG))
+    empty = present_curve(curve, evaluate(plain_cell(), LOG))
     bent = replace(empty, values=1e-3 * np.sin(np.arange(len(empty.values))))
     fitter = Fitter(record(plain_cell().with_effects([bent, *true]), LOG, seed=66))
     search = Search(fitter.fit(plain_cell(), NOISE), fitter)

@@ -10,7 +10,7 @@ import pytest
 from calib.chain.covariates import covariate_named
 from calib.chain.effects import make_effect
 from calib.chain.empirical import Curve, present_curve, site_named
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.discovery.residual_structure import find_residual_structure
 from calib.discovery.search import Search, criterion
 from calib.discovery.start import Fitter
@@ -36,7 +36,7 @@ def names(views: Views) -> list[str]:
 
 def test_a_focal_length_that_turns_back_with_the_distance_is_focus_breathing():
     curve = Curve(site_named("focal_length"), covariate_named("distance"), 0.36, 0.9)
-    state = walk(plain_cell(), LOG)
+    state = evaluate(plain_cell(), LOG)
     bent = present_curve(curve, state)
     bent.values[1] = 4e-3  # the second Legendre function: the same at both ends
     assert names(record(plain_cell().with_effects([bent]), LOG, seed=51)) == ["focus_breathing"]
@@ -48,7 +48,7 @@ def test_a_drift_told_of_some_frames_holds_for_the_others(name):
     drift = make_effect(name, {amount: 1e-3, "tau_s": 200.0, "start_s": float(LOG.t_s[0])})
     model = plain_cell().with_effects([drift])
     late = np.arange(20, 40)
-    every, some = walk(model, LOG), walk(model, LOG.take(late))
+    every, some = evaluate(model, LOG), evaluate(model, LOG.take(late))
     np.testing.assert_allclose(some.optics, every.optics[late])
     np.testing.assert_allclose(some.camera_from_board, every.camera_from_board[late])
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.chain.projection import project
 from calib.views import Board, FloatArray, Views
 from cell.errors import InputError
@@ -35,7 +35,7 @@ def _chain(source: CalibrationSource, distance_m: float) -> tuple[FloatArray, Fl
     )
     x, y = np.meshgrid(np.linspace(-0.4, 0.4, 7), np.linspace(-0.3, 0.3, 5))
     points = distance_m * np.column_stack([x.ravel(), y.ravel(), np.ones(x.size)])
-    return points, project(walk(old.model, focused).optics, np.eye(4)[None], points)[0]
+    return points, project(evaluate(old.model, focused).optics, np.eye(4)[None], points)[0]
 
 
 @pytest.mark.parametrize("distance_m", DISTANCES_M)

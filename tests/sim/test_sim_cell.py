@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from calib.chain import rigid
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.chain.optics import COLUMN
 from drivers.arm import Motion, MoveTarget
 from drivers.camera import FocusSetting
@@ -142,7 +142,7 @@ def test_a_held_focus_keeps_its_focal_length(mount):
         )
         cell = replace(cell, model=swapped, mount=mount)
     views = views_of(cell, [Row(0.0, q, np.zeros(6), q, 0.01)])
-    state = walk(cell.model, views)
+    state = evaluate(cell.model, views)
     alpha = optics_focused_at(cell.model, views, state, 0.2)[COLUMN["alpha_px"]]
     k = cell.model.effects[0].values[0]
     assert alpha == pytest.approx(1370.8 - k / 0.2**2, abs=1e-6)
@@ -290,7 +290,7 @@ def test_the_presets_reach_their_distances_and_see_the_board(cell, distances):
 def test_breathing_is_the_papers_law_at_its_nearest_view():
     cell = irb140_eosens()
     views = tour(cell, rail(cell, [0.35, 0.7]))
-    state = walk(cell.model, views)
+    state = evaluate(cell.model, views)
     alpha = state.optics[:, COLUMN["alpha_px"]]
     assert alpha[0] == pytest.approx(4289.8, abs=1.0)
     assert alpha[1] == pytest.approx(4755.8 * (1 - 0.0245), abs=0.5)
@@ -309,7 +309,7 @@ def zhang(cell, views):
         flags=cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST,
     )
     seen = rigid.compose(np.array(turns)[:, :, 0], np.array(shifts)[:, :, 0])
-    true = walk(cell.model, views).camera_from_board
+    true = evaluate(cell.model, views).camera_from_board
     return rms, rigid.inverse(seen)[:, :3, 3] - rigid.inverse(true)[:, :3, 3]
 
 

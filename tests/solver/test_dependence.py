@@ -1,4 +1,4 @@
-"""What is linearised, what a step moves, and walks that are taken up again."""
+"""What is linearised, what a step moves, and evaluations that are resumed."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from calib.chain import rigid
 from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue, make_effect
-from calib.chain.model import Journey, walk
+from calib.chain.model import StagedEvaluation, evaluate
 from calib.chain.optics import COLUMN, OPTICS
 from calib.solver.unknowns import dependence, moved, unknowns_of
 from calib.views import Mount
@@ -60,18 +60,18 @@ def _typical(effect: Effect) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
-def test_a_walk_taken_up_again_ends_where_a_whole_one_does(mount: Mount) -> None:
+def test_a_resumed_evaluation_ends_where_a_whole_one_does(mount: Mount) -> None:
     model, views = cell(mount, frames=10)
     model = model.with_effects(_everything())
     error = np.full((10, 6), 1e-4)
-    journey = Journey(model, views, flange_error=error)
+    staged = StagedEvaluation(model, views, flange_error=error)
     for unknown in unknowns_of(model, FREE):
         changed = moved(model, (unknown,), np.array([unknown.typical]))
-        again = journey.again(changed, journey.entry(unknown.place))
-        whole = walk(changed, views, flange_error=error)
+        again = staged.from_stage(changed, staged.entry(unknown.place))
+        whole = evaluate(changed, views, flange_error=error)
         assert np.array_equal(again.optics, whole.optics), unknown.name
         assert np.array_equal(again.camera_from_board, whole.camera_from_board), unknown.name
         assert np.array_equal(again.points_m, whole.points_m), unknown.name
-    untouched = walk(model, views, flange_error=error)
-    assert np.array_equal(journey.state.optics, untouched.optics)
-    assert np.array_equal(journey.state.points_m, untouched.points_m)
+    untouched = evaluate(model, views, flange_error=error)
+    assert np.array_equal(staged.state.optics, untouched.optics)
+    assert np.array_equal(staged.state.points_m, untouched.points_m)

@@ -15,7 +15,7 @@ from calib.chain.covariates import COVARIATES, covariate_named
 from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue
 from calib.chain.empirical import SITES, Curve, present_curve, span
-from calib.chain.model import CellModel, predict, walk
+from calib.chain.model import CellModel, evaluate, predict
 from calib.chain.optics import COLUMN, OPTICS
 from calib.chain.projection import project_with_jacobians
 from calib.solver.unknowns import Dependence, Unknown, dependence, unknowns_of
@@ -143,8 +143,8 @@ def _curve(site: str, covariate: str, views: Views, model: CellModel) -> Present
     """A curve with every coefficient at some size of its own."""
     where = next(s for s in SITES if s.name == site)
     chosen = covariate_named(covariate)
-    low, high = span(chosen.of(walk(model, views)))
-    zero_curve = present_curve(Curve(where, chosen, low - 0.1, high + 0.1), walk(model, views))
+    low, high = span(chosen.of(evaluate(model, views)))
+    zero_curve = present_curve(Curve(where, chosen, low - 0.1, high + 0.1), evaluate(model, views))
     typical = np.array([p.typical * (p.role == "amount") for p in zero_curve.effect.parameters])
     sizes = np.random.default_rng(7).uniform(0.5, 1.5, len(typical))
     return replace(zero_curve, values=zero_curve.values + sizes * typical)

@@ -6,20 +6,20 @@ import numpy as np
 
 from calib.chain import rigid
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    arm, views = walk.arm, walk.views
+def _act(values: FloatArray, state: ChainState) -> None:
+    arm, views = state.arm, state.views
     if arm is None:
         return
-    moment_Nm = walk.once(
+    moment_Nm = state.once(
         "base_moment_Nm", lambda: arm.base_moment(views.joints_rad, views.payload_kg or 0.0)
     )
     turn = np.nan_to_num(moment_Nm) * np.array([values[0], values[0] + values[1], 0.0])
     tilted = rigid.compose(turn, np.zeros_like(turn))
-    walk.base_from_flange = rigid.product(tilted, walk.base_from_flange)
+    state.base_from_flange = rigid.product(tilted, state.base_from_flange)
 
 
 EFFECT = Effect(

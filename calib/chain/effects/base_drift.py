@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from calib.chain import rigid
 from calib.chain.effect import Effect
+from calib.chain.state import ChainState
 from calib.chain.steps import SIX
-from calib.chain.walk import Walk
 from calib.chain.warming import START, TIME_CONSTANT, warming_candidates, warmth
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    drift = warmth(values[6], values[7], walk.views)[:, None] * values[:6]
-    walk.base_from_flange = rigid.product(rigid.from_vector(drift), walk.base_from_flange)
+def _act(values: FloatArray, state: ChainState) -> None:
+    drift = warmth(values[6], values[7], state.views)[:, None] * values[:6]
+    state.base_from_flange = rigid.product(rigid.from_vector(drift), state.base_from_flange)
 
 
 EFFECT = Effect(

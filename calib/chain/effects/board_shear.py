@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    walk.points_m[:, 0] += values[0] * walk.points_m[:, 1]
-    walk.points_m[:, 1] *= 1.0 + values[1]
+def _act(values: FloatArray, state: ChainState) -> None:
+    state.points_m[:, 0] += values[0] * state.points_m[:, 1]
+    state.points_m[:, 1] *= 1.0 + values[1]
 
 
 EFFECT = Effect(

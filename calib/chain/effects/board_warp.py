@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    board = walk.views.board
-    x = walk.points_m[:, 0] / ((board.cols - 1) * board.square_m) * 2.0 - 1.0
-    y = walk.points_m[:, 1] / ((board.rows - 1) * board.square_m) * 2.0 - 1.0
+def _act(values: FloatArray, state: ChainState) -> None:
+    board = state.views.board
+    x = state.points_m[:, 0] / ((board.cols - 1) * board.square_m) * 2.0 - 1.0
+    y = state.points_m[:, 1] / ((board.rows - 1) * board.square_m) * 2.0 - 1.0
     height = values[0] * (x * x - 1.0) + values[1] * (y * y - 1.0) + values[2] * x * y
-    walk.points_m[:, 2] += height
+    state.points_m[:, 2] += height
 
 
 EFFECT = Effect(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 _ORDER = 5
@@ -13,15 +13,15 @@ _WAVES = tuple((i, j) for i in range(_ORDER) for j in range(_ORDER) if i + j > 1
 """Half waves along x and y; a tilt is the board's pose."""
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    board = walk.views.board
-    x = walk.points_m[:, 0] / ((board.cols - 1) * board.square_m)
-    y = walk.points_m[:, 1] / ((board.rows - 1) * board.square_m)
+def _act(values: FloatArray, state: ChainState) -> None:
+    board = state.views.board
+    x = state.points_m[:, 0] / ((board.cols - 1) * board.square_m)
+    y = state.points_m[:, 1] / ((board.rows - 1) * board.square_m)
     along_x = np.cos(np.pi * np.arange(_ORDER)[:, None] * x)
     along_y = np.cos(np.pi * np.arange(_ORDER)[:, None] * y)
     for amount, (i, j) in zip(values, _WAVES, strict=True):
         if amount:
-            walk.points_m[:, 2] += amount * along_x[i] * along_y[j]
+            state.points_m[:, 2] += amount * along_x[i] * along_y[j]
 
 
 EFFECT = Effect(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    walk.column("k1")[:] += values[0] / walk.focused_m
+def _act(values: FloatArray, state: ChainState) -> None:
+    state.column("k1")[:] += values[0] / state.focused_m
 
 
 EFFECT = Effect(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    walk.column("pupil_m_rad2")[:] += values[0]
+def _act(values: FloatArray, state: ChainState) -> None:
+    state.column("pupil_m_rad2")[:] += values[0]
 
 
 EFFECT = Effect(

@@ -8,21 +8,21 @@ import numpy as np
 
 from calib.chain.effect import Effect, Parameter
 from calib.chain.projection import project
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    longer_s = np.nan_to_num(walk.views.exposure_s - values[1])
-    middle = walk.points_m.mean(axis=0)
-    farthest_m = float(np.linalg.norm(walk.points_m - middle, axis=1).max())
-    farthest_px = walk.column("alpha_px") * farthest_m / walk.distance_m
+def _act(values: FloatArray, state: ChainState) -> None:
+    longer_s = np.nan_to_num(state.views.exposure_s - values[1])
+    middle = state.points_m.mean(axis=0)
+    farthest_m = float(np.linalg.norm(state.points_m - middle, axis=1).max())
+    farthest_px = state.column("alpha_px") * farthest_m / state.distance_m
     growth = 1.0 + values[0] * longer_s / farthest_px
-    centre = project(walk.optics, walk.camera_from_board, middle[None])[:, 0]
+    centre = project(state.optics, state.camera_from_board, middle[None])[:, 0]
     for name in ("alpha_px", "beta_px", "skew_px"):
-        walk.column(name)[:] *= growth
+        state.column(name)[:] *= growth
     for axis, name in enumerate(("u0_px", "v0_px")):
-        column = walk.column(name)
+        column = state.column(name)
         column[:] = centre[:, axis] + growth * (column - centre[:, axis])
 
 

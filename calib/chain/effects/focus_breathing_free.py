@@ -7,23 +7,23 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 
 _NODES = 6
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
+def _act(values: FloatArray, state: ChainState) -> None:
     from scipy.interpolate import CubicSpline  # half a second that no other effect needs
 
     near_m, far_m = values[_NODES - 1], values[_NODES]
     at = np.linspace(0.0, 1.0, _NODES)
     curve = CubicSpline(at, np.concatenate([values[: _NODES - 1], [0.0]]), bc_type="natural")
-    inverse = np.clip(1.0 / walk.focused_m, 0.7 / far_m, 1.4 / near_m)
+    inverse = np.clip(1.0 / state.focused_m, 0.7 / far_m, 1.4 / near_m)
     where = (1.0 / near_m - inverse) / (1.0 / near_m - 1.0 / far_m)
     growth = 1.0 + curve(where)
-    walk.column("alpha_px")[:] *= growth
-    walk.column("beta_px")[:] *= growth
+    state.column("alpha_px")[:] *= growth
+    state.column("beta_px")[:] *= growth
 
 
 _SPANS_M = (

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    near = 1.0 / np.square(walk.focused_m)
-    ratio = walk.column("beta_px") / walk.column("alpha_px")
-    walk.column("alpha_px")[:] -= values[0] * near
-    walk.column("beta_px")[:] -= values[0] * near * ratio
+def _act(values: FloatArray, state: ChainState) -> None:
+    near = 1.0 / np.square(state.focused_m)
+    ratio = state.column("beta_px") / state.column("alpha_px")
+    state.column("alpha_px")[:] -= values[0] * near
+    state.column("beta_px")[:] -= values[0] * near * ratio
 
 
 EFFECT = Effect(

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    distance_m = np.maximum(walk.focused_m, 1e-3)
+def _act(values: FloatArray, state: ChainState) -> None:
+    distance_m = np.maximum(state.focused_m, 1e-3)
     growth = distance_m / (distance_m - np.minimum(values[0], 0.9 * distance_m))
-    walk.column("alpha_px")[:] *= growth
-    walk.column("beta_px")[:] *= growth
+    state.column("alpha_px")[:] *= growth
+    state.column("beta_px")[:] *= growth
 
 
 EFFECT = Effect(

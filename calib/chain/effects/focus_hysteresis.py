@@ -8,34 +8,34 @@ import numpy as np
 
 from calib.chain import rigid
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 
 _FIRST_FRAME, _FIRST_CAME_FROM_M = 1, 2
 
 
-def _came_from_m(walk: Walk) -> FloatArray:
+def _came_from_m(state: ChainState) -> FloatArray:
     """(N,) distance of the board where the arm came from; the frame before where not logged."""
-    order = np.argsort(walk.views.frame, kind="stable")
+    order = np.argsort(state.views.frame, kind="stable")
     before = np.empty(len(order))
-    before[order] = np.concatenate([walk.focused_m[order][:1], walk.focused_m[order][:-1]])
-    arm, views = walk.arm, walk.views
-    if arm is None or not walk.in_hand:
+    before[order] = np.concatenate([state.focused_m[order][:1], state.focused_m[order][:-1]])
+    arm, views = state.arm, state.views
+    if arm is None or not state.in_hand:
         return before
-    flange = walk.once("approach_flange", lambda: arm.forward(views.approach_joints_rad))
-    camera = rigid.product(flange, walk.flange_from_mounted)
-    camera_from_board = rigid.product(rigid.inverse(camera), walk.base_from_fixed)
-    centre = walk.points_m.mean(axis=0)
+    flange = state.once("approach_flange", lambda: arm.forward(views.approach_joints_rad))
+    camera = rigid.product(flange, state.flange_from_mounted)
+    camera_from_board = rigid.product(rigid.inverse(camera), state.base_from_fixed)
+    centre = state.points_m.mean(axis=0)
     approach = camera_from_board[:, 2, :3] @ centre + camera_from_board[:, 2, 3]
     return np.where(np.isfinite(approach), approach, before)
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    first = walk.views.frame == values[_FIRST_FRAME]
-    before = np.where(first, values[_FIRST_CAME_FROM_M], _came_from_m(walk))
-    growth = 1.0 + values[0] * np.sign(walk.focused_m - before)
-    walk.column("alpha_px")[:] *= growth
-    walk.column("beta_px")[:] *= growth
+def _act(values: FloatArray, state: ChainState) -> None:
+    first = state.views.frame == values[_FIRST_FRAME]
+    before = np.where(first, values[_FIRST_CAME_FROM_M], _came_from_m(state))
+    growth = 1.0 + values[0] * np.sign(state.focused_m - before)
+    state.column("alpha_px")[:] *= growth
+    state.column("beta_px")[:] *= growth
 
 
 def _candidates(views: Views) -> Sequence[Mapping[str, float]]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    travel = walk.views.joints_rad - walk.views.approach_joints_rad
-    walk.joints_rad = walk.joints_rad + values * np.sign(np.nan_to_num(travel))
+def _act(values: FloatArray, state: ChainState) -> None:
+    travel = state.views.joints_rad - state.views.approach_joints_rad
+    state.joints_rad = state.joints_rad + values * np.sign(np.nan_to_num(travel))
 
 
 EFFECT = Effect(

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    arm, views = walk.arm, walk.views
+def _act(values: FloatArray, state: ChainState) -> None:
+    arm, views = state.arm, state.views
     if arm is None:
         return
-    torques_Nm = walk.once(
+    torques_Nm = state.once(
         "gravity_torques_Nm",
         lambda: arm.gravity_torques(views.joints_rad, views.payload_kg or 0.0),
     )
-    walk.joints_rad = walk.joints_rad - values * torques_Nm
+    state.joints_rad = state.joints_rad - values * torques_Nm
 
 
 EFFECT = Effect(

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
+def _act(values: FloatArray, state: ChainState) -> None:
     cycles = values[12]
-    phase = cycles * walk.views.joints_rad
-    walk.joints_rad = walk.joints_rad + values[0:6] * np.sin(phase) + values[6:12] * np.cos(phase)
+    phase = cycles * state.views.joints_rad
+    state.joints_rad = state.joints_rad + values[0:6] * np.sin(phase) + values[6:12] * np.cos(phase)
 
 
 EFFECT = Effect(

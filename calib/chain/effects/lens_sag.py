@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    gravity = walk.gravity_in_camera()
-    walk.column("u0_px")[:] += values[0] * gravity[:, 0]
-    walk.column("v0_px")[:] += values[0] * gravity[:, 1]
+def _act(values: FloatArray, state: ChainState) -> None:
+    gravity = state.gravity_in_camera()
+    state.column("u0_px")[:] += values[0] * gravity[:, 0]
+    state.column("v0_px")[:] += values[0] * gravity[:, 1]
 
 
 EFFECT = Effect(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 _THETA, _D, _A, _ALPHA = range(4)
@@ -17,11 +17,11 @@ _TWISTS = tuple((f"twist_rad_{j}", j - 1, _ALPHA) for j in range(1, 6))
 _ENTRIES = _LENGTHS + _TWISTS
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    offset = np.zeros((6, 5)) if walk.dh_offset is None else walk.dh_offset
+def _act(values: FloatArray, state: ChainState) -> None:
+    offset = np.zeros((6, 5)) if state.dh_offset is None else state.dh_offset
     for value, (_, joint, column) in zip(values, _ENTRIES, strict=True):
         offset[joint, column] += value
-    walk.dh_offset = offset
+    state.dh_offset = offset
 
 
 EFFECT = Effect(

@@ -10,15 +10,15 @@ import numpy as np
 
 from calib.chain import rigid
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import DOWN_IN_BASE, Walk
+from calib.chain.state import DOWN_IN_BASE, ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    gravity = np.einsum("nji,j->ni", walk.base_from_flange[:, :3, :3], DOWN_IN_BASE)
+def _act(values: FloatArray, state: ChainState) -> None:
+    gravity = np.einsum("nji,j->ni", state.base_from_flange[:, :3, :3], DOWN_IN_BASE)
     lever = values[[1, 2, 0]]
     bend = np.cross(lever, gravity) + values[3] * gravity
-    walk.flange_from_mounted = rigid.compose(bend, np.zeros_like(bend)) @ walk.flange_from_mounted
+    state.flange_from_mounted = rigid.compose(bend, np.zeros_like(bend)) @ state.flange_from_mounted
 
 
 EFFECT = Effect(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from calib.chain import rigid
 from calib.chain.effect import Effect, Parameter
+from calib.chain.state import ChainState
 from calib.chain.steps import SIX, after, step_candidates
-from calib.chain.walk import Walk
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    moved = after(values[6], walk.views)
-    walk.flange_from_mounted = walk.flange_from_mounted @ rigid.from_vector(moved * values[:6])
+def _act(values: FloatArray, state: ChainState) -> None:
+    moved = after(values[6], state.views)
+    state.flange_from_mounted = state.flange_from_mounted @ rigid.from_vector(moved * values[:6])
 
 
 EFFECT = Effect(

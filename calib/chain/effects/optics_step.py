@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
+from calib.chain.state import ChainState
 from calib.chain.steps import after, step_candidates
-from calib.chain.walk import Walk
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    stepped = after(values[3], walk.views)[:, 0]
+def _act(values: FloatArray, state: ChainState) -> None:
+    stepped = after(values[3], state.views)[:, 0]
     for name in ("alpha_px", "beta_px"):
-        walk.column(name)[:] *= 1.0 + stepped * values[0]
-    walk.column("u0_px")[:] += stepped * values[1]
-    walk.column("v0_px")[:] += stepped * values[2]
+        state.column(name)[:] *= 1.0 + stepped * values[0]
+    state.column("u0_px")[:] += stepped * values[1]
+    state.column("v0_px")[:] += stepped * values[2]
 
 
 EFFECT = Effect(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    walk.joints_rad = walk.joints_rad + walk.views.joint_velocity_rad_s * values[0]
+def _act(values: FloatArray, state: ChainState) -> None:
+    state.joints_rad = state.joints_rad + state.views.joint_velocity_rad_s * values[0]
 
 
 EFFECT = Effect(

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 
 from calib.chain.effect import Effect, Parameter
 from calib.chain.optics import COLUMN
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
+def _act(values: FloatArray, state: ChainState) -> None:
     first = COLUMN["sweep_x_m"]
-    walk.optics[:, first : first + 6] += values[0] * walk.board_velocity()
-    walk.column("height_px")[:] = walk.views.height_px
-    walk.column("pose_row")[:] = values[1] - 0.5
+    state.optics[:, first : first + 6] += values[0] * state.board_velocity()
+    state.column("height_px")[:] = state.views.height_px
+    state.column("pose_row")[:] = values[1] - 0.5
 
 
 def _candidates(_: Views) -> Sequence[Mapping[str, float]]:

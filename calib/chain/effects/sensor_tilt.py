@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    walk.column("tilt_x_rad")[:] += values[0]
-    walk.column("tilt_y_rad")[:] += values[1]
+def _act(values: FloatArray, state: ChainState) -> None:
+    state.column("tilt_x_rad")[:] += values[0]
+    state.column("tilt_y_rad")[:] += values[1]
 
 
 EFFECT = Effect(

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from calib.chain import rigid
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.chain.warming import START, TIME_CONSTANT, warming_candidates, warmth
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    size = 1.0 + values[0] * warmth(values[1], values[2], walk.views)[:, None]
-    camera_m, board = walk.base_from_camera[:, :3, 3], walk.base_from_board.copy()
-    middle = board[:, :3, :3] @ walk.points_m.mean(axis=0)
+def _act(values: FloatArray, state: ChainState) -> None:
+    size = 1.0 + values[0] * warmth(values[1], values[2], state.views)[:, None]
+    camera_m, board = state.base_from_camera[:, :3, 3], state.base_from_board.copy()
+    middle = board[:, :3, :3] @ state.points_m.mean(axis=0)
     # to the camera a board that has grown is one that stands nearer by the same share; only a lens
     # that focuses on it would tell them apart, by less than a thousandth of a pixel
     away = board[:, :3, 3] + middle - camera_m
     board[:, :3, 3] = camera_m + away / size - middle
-    if walk.in_hand:
-        walk.base_from_fixed = board
+    if state.in_hand:
+        state.base_from_fixed = board
     else:
-        walk.flange_from_mounted = rigid.product(rigid.inverse(walk.base_from_flange), board)
+        state.flange_from_mounted = rigid.product(rigid.inverse(state.base_from_flange), board)
 
 
 EFFECT = Effect(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect, Parameter
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.chain.warming import START, TIME_CONSTANT, warming_candidates, warmth
 from calib.views import FloatArray
 
 
-def _act(values: FloatArray, walk: Walk) -> None:
-    growth = 1.0 + values[0] * warmth(values[1], values[2], walk.views)
-    walk.column("alpha_px")[:] *= growth
-    walk.column("beta_px")[:] *= growth
+def _act(values: FloatArray, state: ChainState) -> None:
+    growth = 1.0 + values[0] * warmth(values[1], values[2], state.views)
+    state.column("alpha_px")[:] *= growth
+    state.column("beta_px")[:] *= growth
 
 
 EFFECT = Effect(

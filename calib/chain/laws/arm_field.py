@@ -13,7 +13,7 @@ import numpy as np
 
 from calib.chain.effect import Effect, Parameter, Present
 from calib.chain.empirical import UNNAMED, site_named
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 
 FIELD = "field:flange_pose"
@@ -94,10 +94,10 @@ def _numbers(values: FloatArray, effect: Effect) -> tuple[FloatArray, FloatArray
 
 
 def _effect(text: str, along: str, count: int, wide: int) -> Effect:
-    def act(values: FloatArray, walk: Walk) -> None:
+    def act(values: FloatArray, state: ChainState) -> None:
         nodes, weights, length_scale = _numbers(values, effect)
-        places = np.nan_to_num(coordinates(walk.views, along))
-        _SITE.shift(likeness(places, nodes, length_scale) @ weights, walk)
+        places = np.nan_to_num(coordinates(state.views, along))
+        _SITE.shift(likeness(places, nodes, length_scale) @ weights, state)
 
     effect = Effect(
         name=UNNAMED,

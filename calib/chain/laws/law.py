@@ -1,6 +1,6 @@
 """A law without a name: a site of the chain follows covariates in some form.
 
-It is an effect like those of the catalogue, made to measure at run time: walked, fitted,
+It is an effect like those of the catalogue, made to measure at run time: evaluated, fitted,
 simulated and predicted by the same chain.
 """
 
@@ -16,7 +16,7 @@ from calib.chain.effect import Effect, Parameter, Present
 from calib.chain.empirical import INNER_JOINTS, UNNAMED, Site, site_named, span
 from calib.chain.laws import form_of
 from calib.chain.laws.form import Form, Numbers, Range
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import FloatArray
 
 _CONSTANT = "constant_term"
@@ -55,9 +55,9 @@ class Law:
         along = "*".join(covariate.name for covariate in self.covariates)
         return f"{self.form.key}:{self.site.name}.{names}/{along}"
 
-    def functions(self, walk: Walk) -> FloatArray:
+    def functions(self, state: ChainState) -> FloatArray:
         """(N, B) of the form's functions; zero where a covariate is not known."""
-        values = [covariate.of(walk) for covariate in self.covariates]
+        values = [covariate.of(state) for covariate in self.covariates]
         return functions_of(self.form, values, self.ranges, dict(self.numbers))
 
     def with_numbers(self, numbers: Numbers) -> Law:
@@ -74,9 +74,9 @@ def functions_of(
     return np.asarray(form.of(safe, ranges, numbers) * known[:, None])
 
 
-def seen(covariates: Sequence[Covariate], walk: Walk) -> tuple[Range, ...]:
-    """The range of each covariate in this walk."""
-    return tuple(Range(*span(covariate.of(walk))) for covariate in covariates)
+def seen(covariates: Sequence[Covariate], state: ChainState) -> tuple[Range, ...]:
+    """The range of each covariate in these frames."""
+    return tuple(Range(*span(covariate.of(state))) for covariate in covariates)
 
 
 def present_law(law: Law) -> Present:
@@ -98,18 +98,18 @@ def law_effect(law: Law) -> Effect:
     numbers = tuple(_number_parameters(law))
     count = len(amounts)
 
-    def act(values: FloatArray, walk: Walk) -> None:
+    def act(values: FloatArray, state: ChainState) -> None:
         coefficients = values[:count].reshape(-1, len(law.components))
         if not coefficients.any():
             return
         names = (parameter.name for parameter in numbers)
         shaped = law.with_numbers(dict(zip(names, values[count:], strict=False)))
-        functions = shaped.functions(walk)
+        functions = shaped.functions(state)
         if law.constant:
             functions = np.concatenate([functions, np.ones((len(functions), 1))], axis=1)
         moved = np.zeros((len(functions), len(law.site.components)))
         moved[:, list(law.components)] = functions @ coefficients
-        law.site.shift(moved, walk)
+        law.site.shift(moved, state)
 
     along = " and ".join(c.name.replace("_", " ") for c in law.covariates)
     return Effect(

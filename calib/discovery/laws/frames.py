@@ -14,11 +14,11 @@ import numpy as np
 
 from calib.chain.covariates import CONSTANT
 from calib.chain.empirical import Curve, Site, present_curve, site_columns
-from calib.chain.model import walk
-from calib.chain.walk import Walk
+from calib.chain.model import evaluate
+from calib.chain.state import ChainState
 from calib.discovery.score import extended
 from calib.solver.accumulate import LocalEquations, local_equations
-from calib.solver.joint import JointFit, walked
+from calib.solver.joint import JointFit, frame_errors
 from calib.solver.unknowns import Dependence, amounts, prior_information
 from calib.views import BoolArray, FloatArray, Views
 
@@ -45,7 +45,7 @@ class FrameBlocks:
     components:
         The S components, in units of their usual size.
     state:
-        The walk of the fit.
+        The state of the fit.
     information, gradient:
         (N, T + S, T + S) and (N, T + S), corner noise and the frames' own errors accounted for.
     prior, pull:
@@ -56,7 +56,7 @@ class FrameBlocks:
     """
 
     components: tuple[Component, ...]
-    state: Walk
+    state: ChainState
     information: FloatArray
     gradient: FloatArray
     prior: FloatArray
@@ -82,7 +82,7 @@ class FrameBlocks:
 
 def frame_blocks(fit: JointFit, views: Views) -> FrameBlocks:
     """Linearise every site of the chain around a fit, frame by frame."""
-    state = walk(fit.model, views, **walked(fit.own_error))
+    state = evaluate(fit.model, views, **frame_errors(fit.own_error))
     sites = site_columns(views)
     presents = [present_curve(Curve(site, CONSTANT, 0.0, 1.0), state) for site in sites]
     _, found, _, base = extended(fit, views, presents)

@@ -31,11 +31,11 @@ def check_values(data: Any, where: str | Where, *, finite: bool = True) -> None:
         A number is not finite or too large, a text holds a NUL, a key is a list or a mapping, lists
         are nested too deeply or in themselves, or there are too many values.
     """
-    _Walk(where, finite=finite).check(data, ())
+    _Checked(where, finite=finite).check(data, ())
 
 
-class _Walk:
-    """One walk over a file's values; what stands in several places is looked at once."""
+class _Checked:
+    """One pass over a file's values; what stands in several places is looked at once."""
 
     def __init__(self, where: str | Where, *, finite: bool) -> None:
         self._where = where

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from calib.calibration.roughly_known import FRAMES_TELL_NOISE, with_sigma
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.views import FloatArray
 from cell.errors import BadAnswer
 from cell.storage.files.cell_file import CellFile, Layout
@@ -57,7 +57,7 @@ class Found:
         fit, views = known.fit, known.views
 
         def alpha(model: CellModel) -> FloatArray:
-            return np.array(walk(model, views).optics[:, 0].mean())
+            return np.array(evaluate(model, views).optics[:, 0].mean())
 
         alpha_px, alpha_sigma_px = with_sigma(fit, alpha)
         mounted, fixed = (

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.chain.optics import optics_row
 from calib.detection import Detection
 from calib.errors import CalibrationError
@@ -123,7 +123,7 @@ class BootstrapGuide(Guide):
         except CalibrationError as error:
             raise InputError(f"frame {shot.index}: {error}") from None
         if len(views) == 1:
-            distance_m = float(walk(known.fit.model, views).distance_m[0])
+            distance_m = float(evaluate(known.fit.model, views).distance_m[0])
             check_place(self._cell, self.layout, known.fit.model, distance_m, self._told)
         check_moves(self._cell, mounted, known.fit, self._told)
         self.knowledge = known

@@ -13,7 +13,7 @@ from calib.calibration.roughly_known import (
     with_sigma,
 )
 from calib.chain import rigid
-from calib.chain.model import CellModel, predict, walk
+from calib.chain.model import CellModel, evaluate, predict
 from calib.solver.joint import JointFit
 from calib.views import FloatArray, Views
 from cell.sequencer.bodies import outline_m
@@ -55,7 +55,9 @@ class Knowledge:
     @property
     def first_camera_from_board(self) -> FloatArray:
         """(4, 4) how the camera sees the board from where the arm stood first."""
-        return np.asarray(walk(self.fit.model, self.views.take(np.array([0]))).camera_from_board[0])
+        return np.asarray(
+            evaluate(self.fit.model, self.views.take(np.array([0]))).camera_from_board[0]
+        )
 
     def flange_that_sees(self, camera_from_board: FloatArray) -> FloatArray:
         """(4, 4) base_from_flange from which the camera should see the board so."""
@@ -69,7 +71,7 @@ class Knowledge:
         views = self._at(base_from_flange)
 
         def seen(model: CellModel) -> FloatArray:
-            state = walk(model, views)
+            state = evaluate(model, views)
             depth = state.camera_from_board[:, 2, :3] @ state.points_m.T
             depth = depth + state.camera_from_board[:, 2, 3:]
             return np.asarray(np.concatenate([predict(model, views), depth[..., None]], axis=2)[0])

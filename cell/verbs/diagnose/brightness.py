@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.discovery.diagnosis import Diagnosis
 from calib.views import FloatArray
 from cell.errors import InputError
@@ -55,7 +55,7 @@ def brightness_notes(recording: Recording, found: Diagnosis) -> tuple[str, ...]:
         level = level * np.median(views.exposure_s) / views.exposure_s
     if np.isfinite(level).sum() < _FEWEST:
         return ()
-    distance_m = walk(found.twin.model, views).distance_m
+    distance_m = evaluate(found.twin.model, views).distance_m
     order = np.arange(len(views), dtype=np.float64)
     told = _trend(level, distance_m, "with the board's distance, from the nearest to the farthest")
     told += _trend(level, order, "from the first frame to the last")

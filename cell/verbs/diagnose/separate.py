@@ -12,7 +12,7 @@ from calib.bodies import arm_bodies
 from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue
 from calib.chain.kinematics import ArmKinematics
-from calib.chain.model import kinematics_of, walk
+from calib.chain.model import evaluate, kinematics_of
 from calib.chain.optics import COLUMN
 from calib.discovery.design.choose import Design, contest, t_optimal
 from calib.discovery.design.power import DECISIVE
@@ -86,7 +86,7 @@ def _cell(found: Diagnosis, recording: Recording, kinematics: ArmKinematics) -> 
     views, content = found.views, twin_cell(found, recording)
     middle = np.median(views.joints_rad, axis=0)
     home = views.joints_rad[np.argmin(np.abs(views.joints_rad - middle).max(axis=1))]
-    distance = walk(found.twin.model, views).distance_m
+    distance = evaluate(found.twin.model, views).distance_m
     truth = content["simulation"]
     content["layout"] = {
         "mounted": truth["mounted"],
@@ -222,7 +222,7 @@ class _Around:
         """Distance at the recorded pose that serves as home."""
         views = self.found.views
         at = int(np.argmin(np.abs(views.joints_rad - self.home_rad).max(axis=1)))
-        return float(walk(self.found.twin.model, views).distance_m[at])
+        return float(evaluate(self.found.twin.model, views).distance_m[at])
 
 
 def _rounds(design: Design) -> int:

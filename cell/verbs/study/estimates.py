@@ -15,7 +15,7 @@ from calib.calibration.result import Focus
 from calib.calibration.shared import FAR_NAMES
 from calib.calibration.simulated_views import views_that_see
 from calib.chain import rigid
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.chain.optics import COLUMN
 from calib.discovery.diagnosis import NamedEffect
 from calib.handeye import camera_position_error_m
@@ -121,7 +121,7 @@ def _optics_at(distance_m: float, trial: Trial) -> dict[str, float]:
     pose = np.eye(4)[None]
     pose[0, :3, 3] = [0.0, 0.0, distance_m] - trial.cell.board.corners_m.mean(axis=0)
     made = views_that_see(model, trial.views, trial.cell.board, pose)
-    state = walk(model.with_effects(lens), replace(made, robot_model=None))
+    state = evaluate(model.with_effects(lens), replace(made, robot_model=None))
     return {name: float(state.column(name)[0]) for name in ("alpha_px", "beta_px")}
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib.chain.model import walk
+from calib.chain.model import evaluate
 from calib.chain.optics import COLUMN
 from calib.chain.rigid import inverse, to_vector
 from calib.detection.orientation import turned_order
@@ -73,7 +73,7 @@ def _matrix(old: OldCell, views: Views) -> FloatArray:
     blank = replace(
         blank, base_from_flange=np.eye(4)[None], focus_distance_m=np.array([ahead[2, 3]])
     )
-    row = walk(old.model, blank).optics[0]
+    row = evaluate(old.model, blank).optics[0]
     alpha, beta, skew, u0, v0 = (
         row[COLUMN[name]] for name in ("alpha_px", "beta_px", "skew_px", "u0_px", "v0_px")
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.chain.projection import project, project_with_jacobians
 from calib.chain.rigid import inverse
 from calib.distributions import normal_tail
@@ -124,7 +124,7 @@ class _Seen:
         self.old, self.model, self.views = old, model, views
         self.noise = found.noise
         self.pixels = views.corners_px[:, ends]
-        state = walk(model, views)
+        state = evaluate(model, views)
         on_board = state.points_m[ends]
         place = state.base_from_board[0] if state.in_hand else state.flange_from_mounted[0]
         self.start = on_board @ place[:3, :3].T + place[:3, 3]
@@ -140,7 +140,7 @@ class _Seen:
         self, model: CellModel, flange_error: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """(N, K) optics, and (N, 4, 4) cameras from the frame in which the board stands still."""
-        state = walk(model, self.views, flange_error=flange_error)
+        state = evaluate(model, self.views, flange_error=flange_error)
         if state.in_hand:
             return state.optics, inverse(state.base_from_camera)
         return state.optics, inverse(state.base_from_fixed) @ state.base_from_flange

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.chain.model import CellModel, predict, walk
+from calib.chain.model import CellModel, evaluate, predict
 from calib.chain.optics import COLUMN
 from calib.chain.rigid import inverse
 from calib.solver.free_poses import fit_free_poses
@@ -91,7 +91,7 @@ def misfit_of(old: OldCell, found: Judgement) -> Misfit:
     start = _at_board(old, old.model, found.still.model)
     fit = fit_joint(start, views, board, _STILL, fixed_noise=True, weight=weight)
     residual = np.where(weight[..., None] > 0, views.corners_px - predict(fit.model, views), np.nan)
-    state = walk(fit.model, views)
+    state = evaluate(fit.model, views)
     scale = np.sqrt(state.optics[:, COLUMN["alpha_px"]] * state.optics[:, COLUMN["beta_px"]])
     by_picture = fit_free_poses(
         state.optics, state.camera_from_board, state.points_m, views.corners_px, (), weight=weight

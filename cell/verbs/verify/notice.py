@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chain.model import predict, walk
+from calib.chain.model import evaluate, predict
 from calib.chain.optics import COLUMN
 from calib.chain.rigid import inverse
 from calib.distributions import noncentrality
@@ -76,7 +76,7 @@ def _workpiece_m(
 ) -> FloatArray:
     """(N,) one sigma, by frame, of the error that an unnoticed change makes."""
     views, model = found.views, misfit.model
-    state = walk(model, views)
+    state = evaluate(model, views)
     covariance = both.covariance[np.ix_(camera, camera)]
     scale = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from calib.chain.effect import Effect
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.chain.rigid import inverse
 from calib.views import Views
 from cell.views.report.data import Truth
@@ -15,7 +15,7 @@ def simulation_truth(model: CellModel, views: Views) -> Truth:
     A board whose two ends look alike may have been named from the other end than the simulator's,
     so that poses in its frame cannot be compared; then only the scale factors are given.
     """
-    state = walk(model, views)
+    state = evaluate(model, views)
     lopsided = (views.board.rows + views.board.cols) % 2 == 1
     return Truth(
         board_from_camera=inverse(state.camera_from_board) if lopsided else None,

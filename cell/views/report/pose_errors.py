@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.chain import rigid
-from calib.chain.model import CellModel, walk
+from calib.chain.model import CellModel, evaluate
 from calib.chain.optics import COLUMN
 from calib.chain.projection import project_with_jacobians
-from calib.chain.walk import Walk
+from calib.chain.state import ChainState
 from calib.views import BoolArray, FloatArray, Views
 
 _STEPS = 8
@@ -27,7 +27,7 @@ class PoseErrors:
     Attributes
     ----------
     state:
-        The walk along the model.
+        The state that the model gives.
     error:
         (N, 6) error of the camera's pose by the model against the picture's: metres in the camera
         frame, then a rotation vector; NaN where a frame has no pose or too few corners.
@@ -35,7 +35,7 @@ class PoseErrors:
         (N, M, 2) observed minus predicted at the picture's own pose.
     """
 
-    state: Walk
+    state: ChainState
     error: FloatArray
     residual_px: FloatArray
 
@@ -52,7 +52,7 @@ class PoseErrors:
 
 def pose_errors(model: CellModel, views: Views) -> PoseErrors:
     """Free every frame's camera pose, starting from the model's, until the corners fit best."""
-    state = walk(model, views)
+    state = evaluate(model, views)
     start = state.camera_from_board
     usable: BoolArray = np.isfinite(start).all(axis=(1, 2)) & (views.seen.sum(axis=1) >= 4)
     pose = np.where(usable[:, None, None], start, _ANYWHERE)
@@ -118,7 +118,7 @@ def without_constant_part(found: PoseErrors) -> FloatArray:
 
 
 def _linear(
-    state: Walk, pose: FloatArray, views: Views, optics: FloatArray
+    state: ChainState, pose: FloatArray, views: Views, optics: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Residuals (N, M, 2) and Jacobians by pose and optics, zero where no corner was seen."""
     pixels, j_pose, j_optics = project_with_jacobians(optics, pose, state.points_m)

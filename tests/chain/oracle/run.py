@@ -17,7 +17,7 @@ from calib.views import FloatArray, Views
 from tests.chain.oracle import curves, formulas
 from tests.chain.oracle.effects import ORACLES
 from tests.chain.oracle.formulas import Array
-from tests.chain.oracle.scene import ORDER, Acting, Oracle, Scene, pixels, walk
+from tests.chain.oracle.scene import ORDER, Acting, Oracle, Scene, evaluate, pixels
 
 
 def oracle_of(present: Present) -> Oracle:
@@ -55,15 +55,15 @@ class Run:
         scene = self._scene(x, frame)
         effects = self._effects(x)
         error = anp.dot(formulas.rigid(self.flange_error[frame]), formulas.rigid(x[-6:]))
-        walk(scene, effects, error, ORDER[:4])
+        evaluate(scene, effects, error, ORDER[:4])
         if frame:
             scene.focused_before = lambda: self._focused(formulas.plain(x), frame - 1)
-        walk(scene, effects, error, ORDER[4:])
+        evaluate(scene, effects, error, ORDER[4:])
         return pixels(scene, corners)
 
     def _focused(self, x: FloatArray, frame: int) -> Array:
         scene = self._scene(x, frame)
-        walk(scene, self._effects(x), formulas.rigid(self.flange_error[frame]), ORDER[:4])
+        evaluate(scene, self._effects(x), formulas.rigid(self.flange_error[frame]), ORDER[:4])
         return scene.focused
 
     def _scene(self, x: Array, frame: int) -> Scene:

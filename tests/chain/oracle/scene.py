@@ -99,7 +99,7 @@ Acting = Sequence[tuple[str, Oracle, Mapping[str, Array]]]
 """Effects: link, oracle, numbers of each."""
 
 
-def walk(scene: Scene, effects: Acting, flange_error: Array, links: Sequence[str]) -> None:
+def evaluate(scene: Scene, effects: Acting, flange_error: Array, links: Sequence[str]) -> None:
     """Let every effect of these links act, and the flange be off by its error."""
     for link in links:
         for where, oracle, numbers in effects:

@@ -28,7 +28,7 @@ _PART = re.compile(
 def series_in(path: Path, data: Any, layout: str) -> list[Series]:
     """Whatever looks like poses or joint angles anywhere in the data, by where it stands."""
     found: dict[str, list[RawPose]] = {}
-    for key, pose in _walk(path, data, "", None, None, None):
+    for key, pose in _found_in(path, data, "", None, None, None):
         found.setdefault(re.sub(r"\d+", "#", key), []).append(pose)
     names = _joint_names(data)
     return [
@@ -37,7 +37,7 @@ def series_in(path: Path, data: Any, layout: str) -> list[Series]:
     ]
 
 
-def _walk(
+def _found_in(
     path: Path, data: Any, key: str, number: int | None, name: str | None, time_s: float | None
 ) -> Iterator[tuple[str, RawPose]]:
     where = f"{path}: {key or 'top level'}"
@@ -52,7 +52,7 @@ def _walk(
     elif isinstance(data, list):
         for place, item in enumerate(data):
             inner = None if key else number
-            yield from _walk(path, item, f"{key}[{place}]", inner, name, time_s)
+            yield from _found_in(path, item, f"{key}[{place}]", inner, name, time_s)
 
 
 def _mapping(
@@ -82,7 +82,7 @@ def _mapping(
         told = _last_number(inner)
         at = f"{key}.{inner}".strip(".")
         own = inner if told is not None else name
-        yield from _walk(path, item, at, number if told is None else told, own, time_s)
+        yield from _found_in(path, item, at, number if told is None else told, own, time_s)
 
 
 def _last_number(name: str) -> int | None:

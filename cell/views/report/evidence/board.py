@@ -49,9 +49,9 @@ def _by_law(data: ReportData, effect: Mapping[str, Any]) -> FloatArray | None:
     except KeyError:
         return None
     plain = CellModel(optics_row(), np.eye(4), np.eye(4))
-    walk = start(plain, data.views.take(np.array([0])), None)
-    present.effect.act(present.values, walk)
-    return np.asarray(walk.points_m - data.views.board.corners_m)
+    state = start(plain, data.views.take(np.array([0])), None)
+    present.effect.act(present.values, state)
+    return np.asarray(state.points_m - data.views.board.corners_m)
 
 
 def _law(effect: Mapping[str, Any]) -> dict[str, str]:

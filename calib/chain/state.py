@@ -17,7 +17,7 @@ DOWN_IN_BASE = np.array([0.0, 0.0, -1.0])
 
 
 @dataclass
-class Walk:
+class ChainState:
     """What the links have said so far about N frames.
 
     An effect may write into `optics`, `points_m` and `dh_offset`; every other array it replaces.
@@ -56,8 +56,8 @@ class Walk:
     camera_from_board: FloatArray = field(default_factory=lambda: np.empty((0, 4, 4)))
     logged: dict[str, FloatArray] = field(default_factory=dict)
 
-    def copy(self) -> Walk:
-        """A walk that goes on by itself from here."""
+    def copy(self) -> ChainState:
+        """A state that goes on by itself from here."""
         return replace(
             self,
             optics=self.optics.copy(),

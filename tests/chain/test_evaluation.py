@@ -1,4 +1,4 @@
-"""The walk along the links: mounts, distances, order of the effects, curves without a name."""
+"""The chain evaluated: mounts, distances, order of the effects, curves without a name."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from calib.chain.empirical import (
     site_named,
     span,
 )
-from calib.chain.model import predict, walk
+from calib.chain.model import evaluate, predict
 from calib.chain.optics import COLUMN
 from calib.views import Mount
 from tests.chain.cells import cell, mirrored
@@ -25,7 +25,7 @@ from tests.chain.cells import cell, mirrored
 
 def test_the_chain_closes_for_an_eye_in_hand() -> None:
     model, views = cell()
-    state = walk(model, views)
+    state = evaluate(model, views)
     camera = views.base_from_flange @ model.flange_from_mounted
     assert np.allclose(camera @ state.camera_from_board, model.base_from_fixed, atol=1e-12)
 
@@ -45,26 +45,26 @@ def test_a_fixed_eye_is_an_eye_in_hand_with_base_and_flange_exchanged() -> None:
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
 def test_the_distance_is_the_depth_of_the_board_s_middle(mount: Mount) -> None:
     model, views = cell(mount)
-    state = walk(model, views)
+    state = evaluate(model, views)
     board = views.board
     middle = np.array([(board.cols - 1) / 2, (board.rows - 1) / 2, 0.0]) * board.square_m
     depth = [(pose[:3, :3] @ middle + pose[:3, 3])[2] for pose in state.camera_from_board]
     assert np.allclose(state.distance_m, depth)
     assert np.allclose(state.focused_m, depth)
     logged = np.where(np.arange(len(views)) < 3, 0.4, np.nan)
-    focused = walk(model, replace(views, focus_distance_m=logged)).focused_m
+    focused = evaluate(model, replace(views, focus_distance_m=logged)).focused_m
     assert np.allclose(focused, np.where(np.isfinite(logged), 0.4, depth))
 
 
 def test_breathing_follows_the_stated_laws() -> None:
     model, views = cell()
-    distance = walk(model, views).distance_m
+    distance = evaluate(model, views).distance_m
     alpha = model.optics[COLUMN["alpha_px"]]
     square = make_effect("focus_breathing", {"law": "inverse_square", "k_px_m2": 18.0})
-    found = walk(model.with_effects([square]), views)
+    found = evaluate(model.with_effects([square]), views)
     assert np.allclose(found.column("alpha_px"), alpha - 18.0 / distance**2)
     thin = make_effect("focus_breathing", {"law": "thin_lens", "f_m": 0.018})
-    found = walk(model.with_effects([thin]), views)
+    found = evaluate(model.with_effects([thin]), views)
     assert np.allclose(found.column("alpha_px"), alpha * distance / (distance - 0.018))
     ratio = found.column("beta_px") / found.column("alpha_px")
     assert np.allclose(ratio, model.optics[COLUMN["beta_px"]] / alpha)
@@ -94,8 +94,8 @@ def test_a_moved_joint_keeps_the_factory_calibration_in_the_logged_pose() -> Non
     own = rigid.from_vector(np.array([1e-3, 2e-3, -1e-3, 1e-3, 0.0, 2e-3]))
     calibrated = replace(views, base_from_flange=own @ views.base_from_flange)
     offset = make_effect("joint_zero_offset", {"offset_rad": [0, 0, 0.01, 0, 0, 0]})
-    moved = walk(model.with_effects([offset]), calibrated)
-    plain = walk(model.with_effects([offset]), views)
+    moved = evaluate(model.with_effects([offset]), calibrated)
+    plain = evaluate(model.with_effects([offset]), views)
     assert moved.arm is not None
     nominal = moved.arm.forward(views.joints_rad)
     turned = rigid.inverse(nominal) @ plain.base_from_flange
@@ -107,8 +107,8 @@ def test_a_moved_joint_keeps_the_factory_calibration_in_the_logged_pose() -> Non
 def test_a_curve_without_a_name_comes_back_from_its_file(site: str, covariate: str) -> None:
     model, views = cell()
     chosen = covariate_named(covariate)
-    low, high = span(chosen.of(walk(model, views)))
-    zero = present_curve(Curve(site_named(site), chosen, low, high), walk(model, views))
+    low, high = span(chosen.of(evaluate(model, views)))
+    zero = present_curve(Curve(site_named(site), chosen, low, high), evaluate(model, views))
     assert zero.absent
     drawn = np.random.default_rng(2).normal(0, 1, len(zero.values))
     typical = np.array([p.typical if p.role == "amount" else 0.0 for p in zero.effect.parameters])
@@ -135,7 +135,7 @@ def test_a_periodic_curve_keeps_its_period() -> None:
 
 def test_covariates_are_known_where_they_were_logged() -> None:
     model, views = cell()
-    state = walk(model, views)
+    state = evaluate(model, views)
     for covariate in COVARIATES:
         value = covariate.of(state)
         assert len(value) == len(views), covariate.name
@@ -151,7 +151,7 @@ def test_any_key_of_the_log_is_a_covariate_and_so_is_every_word_of_it() -> None:
     names = [covariate.name for covariate in covariates_of(logged)]
     assert {"gain_db", "lamp=near", "lamp=far"} <= set(names)
     assert covariate_named("gain_db").unit == "dB"
-    later = walk(model, logged.take(np.array([2, 3])))
+    later = evaluate(model, logged.take(np.array([2, 3])))
     assert covariate_named("gain_db").of(later).tolist() == [6.0, 0.0]
     assert covariate_named("lamp=near").of(later).tolist() == [1.0, 0.0]
     assert np.isnan(covariate_named("moon").of(later)).all()
