@@ -7,18 +7,25 @@ so a folder for temporary files serves.
 numba compiles a function anew when its own file has changed, and not when the file of one that it
 calls has. After an upgrade the old physics would go on inside of what was kept: so everything kept
 is forgotten when any file with compiled code is another one than before.
+
+numba gives every signature of a function a numbered file and keeps the numbers in an index. Two
+processes that compile different signatures at once take the same number: the index of the one then
+points to the machine code of the other. So they write in turn, and what is forgotten goes whole,
+index and machine code.
 """
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import hashlib
 import os
 import stat
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 VARIABLE = "NUMBA_CACHE_DIR"
 VERBS = ("run", "bootstrap", "plan", "simulate", "calibrate", "diagnose", "verify", "study")
@@ -27,6 +34,7 @@ VERBS = ("run", "bootstrap", "plan", "simulate", "calibrate", "diagnose", "verif
 _CODE = Path(__file__).parents[1] / "calib"
 _ROOMS = (_CODE, _CODE.with_name("sim"))
 _MARK = "calibration-cell.kernels"
+_LOCK = "calibration-cell.lock"
 _KEPT = "accumulate._accumulate-*.nbi"
 
 
@@ -54,7 +62,10 @@ def prepare(arguments: Sequence[str]) -> None:
     forget_stale()
     asked = next((word for word in arguments if word in VERBS), None)
     helps = {"-h", "--help"} & set(arguments)
-    if asked is not None and not helps and not _kept():
+    if asked is None or helps:
+        return
+    write_in_turn()
+    if not _kept():
         sys.stderr.write(
             "first use here: compiling for this processor, once, some twenty seconds\n"
         )
@@ -70,15 +81,57 @@ def forget_stale() -> None:
     for folder in _folders():
         mark = folder / _MARK
         with contextlib.suppress(OSError):
-            marked = mark.is_file()
-            if marked and mark.read_text(encoding="ascii") == now:
+            if _says(mark, now):
                 continue
             folder.mkdir(parents=True, exist_ok=True)
-            for kept in (k for path in code for k in folder.rglob(f"{path.stem}.*.nbi")):
-                # without a mark, tests or a program may have compiled what is here now
-                if marked or kept.stat().st_mtime < changed:
-                    kept.unlink(missing_ok=True)
-            mark.write_text(now, encoding="ascii")
+            with _alone_in(folder):
+                if not _says(mark, now):
+                    _forget(folder, code, changed if not mark.is_file() else None)
+                    mark.write_text(now, encoding="ascii")
+
+
+def _says(mark: Path, now: str) -> bool:
+    return mark.is_file() and mark.read_text(encoding="ascii") == now
+
+
+def _forget(folder: Path, code: Iterable[Path], older_than: float | None) -> None:
+    """Remove what was compiled from these files, machine code first.
+
+    Without a mark, tests or a program may have compiled what is here now: only what is
+    `older_than` the code goes then.
+    """
+    for path in code:
+        for index in folder.rglob(f"{path.stem}.*.nbi"):
+            if older_than is None or index.stat().st_mtime < older_than:
+                for machine_code in index.parent.glob(f"{index.stem}.*.nbc"):
+                    machine_code.unlink(missing_ok=True)
+                index.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Wait until nobody else writes compiled code to the folder."""
+    descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def write_in_turn() -> None:
+    """Let numba read an index, take a number and write both files with nobody else at it."""
+    from numba.core.caching import IndexDataCacheFile
+
+    save = IndexDataCacheFile.save
+    if save.__module__ == __name__:
+        return
+
+    def save_alone(self: Any, key: Any, data: Any) -> None:
+        with _alone_in(Path(self._cache_path)):
+            save(self, key, data)
+
+    IndexDataCacheFile.save = save_alone
 
 
 def _kept() -> bool:

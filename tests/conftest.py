@@ -9,9 +9,10 @@ from collections.abc import Generator
 
 import pytest
 
-from cell.compiled import forget_stale
+from cell.compiled import forget_stale, write_in_turn
 
 forget_stale()
+write_in_turn()
 
 MAY_SKIP = (
     "all tests already run as an ordinary user",

@@ -115,22 +115,24 @@ def _decentred(s: State, k: float) -> None:
     s.p = s.p + k * np.array([1.2e-3, -8e-4])
 
 
+_ARM, _MOUNT, _LENS, _BOARD = ("arm",), ("mount", "arm"), ("lens", "sensor"), ("board", "arm")
+
 CATALOGUE = (
-    Physics("focus inverse square", _inverse_square, ("focus_breathing",)),
-    Physics("focus thin lens", _thin_lens, ("focus_breathing",)),
-    Physics("joint zero", _zero, ("joint_zero_offset", "link_geometry")),
-    Physics("joint compliance", _compliance, ("joint_compliance",)),
-    Physics("once per turn", _once_per_turn, ("joint_periodic_error",)),
-    Physics("board bend", _warp, ("board_warp",)),
-    Physics("board aspect", _scale, ("board_shear", "board_scale")),
-    Physics("bracket bends", _flex, ("mount_flex",)),
-    Physics("board slips", _board_slip, ("board_slip",)),
-    Physics("mount slips", _mount_slip, ("mount_slip",)),
-    Physics("focus ring bumped", _bump, ("optics_step",)),
-    Physics("base tilts", _base_tilt, ("base_compliance",)),
-    Physics("bloom", _bloom, ("exposure_bias",)),
-    Physics("lens sags", _sag, ("lens_sag",)),
-    Physics("decentred", _decentred, ("decentering", "sensor_tilt")),
+    Physics("focus inverse square", _inverse_square, ("focus_breathing",), _LENS),
+    Physics("focus thin lens", _thin_lens, ("focus_breathing",), _LENS),
+    Physics("joint zero", _zero, ("joint_zero_offset", "link_geometry"), _ARM),
+    Physics("joint compliance", _compliance, ("joint_compliance",), _ARM),
+    Physics("once per turn", _once_per_turn, ("joint_periodic_error",), _ARM),
+    Physics("board bend", _warp, ("board_warp",), ("board",)),
+    Physics("board aspect", _scale, ("board_shear", "board_scale"), ("board", *_LENS)),
+    Physics("bracket bends", _flex, ("mount_flex",), _MOUNT),
+    Physics("board slips", _board_slip, ("board_slip",), _BOARD),
+    Physics("mount slips", _mount_slip, ("mount_slip",), _MOUNT),
+    Physics("focus ring bumped", _bump, ("optics_step",), _LENS),
+    Physics("base tilts", _base_tilt, ("base_compliance",), _BOARD),
+    Physics("bloom", _bloom, ("exposure_bias",), (*_LENS, "detector")),
+    Physics("lens sags", _sag, ("lens_sag",), _LENS),
+    Physics("decentred", _decentred, ("decentering", "sensor_tilt"), _LENS),
 )
 
 
@@ -203,7 +205,6 @@ def _reach_m(s: State) -> Array:
     return np.asarray(np.linalg.norm(flange[..., :2, 3], axis=-1))
 
 
-_ARM, _MOUNT, _LENS, _BOARD = ("arm",), ("mount", "arm"), ("lens", "sensor"), ("board", "arm")
 _TIME = ("time", "order")
 
 OUTSIDE = (

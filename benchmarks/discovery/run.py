@@ -1,12 +1,14 @@
 """Conceal recordings, diagnose them, and count what was told: the table of docs/discovery.md.
 
     python -m benchmarks.discovery.run [--clean N] [--catalogue N] [--outside N] [--faults N]
-                                       [--results FILE.jsonl]
+                                       [--hidden N] [--results FILE.jsonl]
 
 The cases of each kind are taken in turn from a list that never changes; a case's name is its seed.
 Each case is written to the results as it ends, and is not run again when it stands there already:
-the table is printed over all of them. A case whose physics the oracle (the true model fitted to
-the same frames) cannot see counts for no measure but false names.
+the table is printed over all of them. Hidden are cases of the catalogue's physics, diagnosed with
+a catalogue that does not have it: right is `unexplained` in the right link, and no name. A case
+whose physics the oracle (the true model fitted to the same frames) cannot see counts for no
+measure but false names.
 """
 
 from __future__ import annotations
@@ -15,8 +17,10 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
@@ -25,9 +29,12 @@ from benchmarks.discovery.oracle import Oracle, consult
 from benchmarks.discovery.physics import CATALOGUE, OUTSIDE, Physics, present
 from benchmarks.discovery.recordings import Concealed, conceal
 from benchmarks.discovery.world import BOARDS, CAMERAS
+from calib.chain.effects import catalogue
 from calib.chain.model import CellModel, predict
+from calib.discovery import candidates
 from calib.discovery.diagnose import diagnose
 from calib.discovery.diagnosis import Diagnosis
+from calib.discovery.laws import contest, review
 from calib.errors import CalibrationError
 from calib.views import Board, Views
 
@@ -35,15 +42,22 @@ SIZES = (1.0, 2.5, 0.5)
 BACKGROUND = ("joint_zero_offset", "link_geometry")
 """Names that are true where the arm's kinematics are off themselves."""
 
+_NAMELESS = ("outside", "hidden")
+"""Kinds of which `unexplained` is right."""
+
+_FOUND_IN_LOG = (("optics_step",),)
+"""Told by the search of the log, whatever the catalogue has."""
+
 
 @dataclass(frozen=True)
 class Case:
-    """What to conceal: (key of physics, size) pairs, and a fault."""
+    """What to conceal: (key of physics, size) pairs, and a fault; names kept from the catalogue."""
 
     kind: str
     name: str
     physics: tuple[tuple[str, float], ...] = ()
     fault: str | None = None
+    hidden: tuple[str, ...] = ()
 
 
 def cases(kind: str) -> Iterator[Case]:
@@ -53,6 +67,10 @@ def cases(kind: str) -> Iterator[Case]:
             yield Case(kind, f"clean {turn}")
         elif kind == "catalogue":
             yield from _sized(kind, CATALOGUE, turn)
+        elif kind == "hidden":
+            for what in (p for p in CATALOGUE if p.names not in _FOUND_IN_LOG):
+                name = f"hidden {turn}: {what.key}"
+                yield Case(kind, name, ((what.key, 1.0),), hidden=what.names)
         elif kind == "outside":
             yield from _sized(kind, OUTSIDE, turn)
             first, other = OUTSIDE[turn % len(OUTSIDE)], CATALOGUE[turn % len(CATALOGUE)]
@@ -121,6 +139,16 @@ class Outcome:
     cpu_s: float
 
 
+@contextmanager
+def without_names(names: tuple[str, ...]) -> Iterator[None]:
+    """Let the diagnosis know a catalogue without these effects."""
+    known = tuple(effect for effect in catalogue() if effect.name not in names)
+    with ExitStack() as stack:
+        for module in (candidates, contest, review):
+            stack.enter_context(patch.object(module, "catalogue", lambda: known))
+        yield
+
+
 def run(case: Case) -> Outcome:
     """Conceal, diagnose, judge."""
     physics = tuple((present(key), size) for key, size in case.physics)
@@ -129,7 +157,10 @@ def run(case: Case) -> Outcome:
     rows = np.arange(len(concealed.ahead))
     started = time.process_time()
     try:
-        found = diagnose(views_of(concealed, rows[~concealed.ahead]), log=views_of(concealed, rows))
+        with without_names(case.hidden):
+            found = diagnose(
+                views_of(concealed, rows[~concealed.ahead]), log=views_of(concealed, rows)
+            )
     except CalibrationError as error:
         return _refused(case, concealed, oracle, str(error), time.process_time() - started)
     return _judged(case, concealed, oracle, found, time.process_time() - started)
@@ -151,17 +182,17 @@ def _judged(
     case: Case, concealed: Concealed, oracle: Oracle, found: Diagnosis, cpu_s: float
 ) -> Outcome:
     names = [effect.name for effect in found.effects]
-    true = [what.names for what, _ in concealed.physics]
+    true = [what.names for what, _ in concealed.physics if not case.hidden]
     true += [concealed.fault.names] if concealed.fault else []
     background = bool(concealed.cell.dh.any())
     tolerated = {name for every in true for name in every} | set(BACKGROUND if background else ())
     false = [name for name in names if name not in tolerated]
     unexplained = found.unexplained_all
     named = all(set(names) & set(every) for every in true if every)
-    nameless = [what for what, _ in concealed.physics if not what.names]
+    nameless = [what for what, _ in concealed.physics if not what.names or case.hidden]
     ok = not false and (
         (named and not nameless and (not unexplained))
-        or (bool(unexplained) and case.kind == "outside")
+        or (bool(unexplained) and case.kind in _NAMELESS)
     )
     link, covariate, form = _located(case, concealed, found)
     before, after = (_miss(concealed, found, cell.model) for cell in (found.plain, found.twin))
@@ -176,14 +207,16 @@ def _located(
     case: Case, concealed: Concealed, found: Diagnosis
 ) -> tuple[bool | None, bool | None, bool | None]:
     """Link, covariate and form of what has no name; a right name counts as right in all."""
-    if case.kind != "outside" or found.verdict == "consistent":
+    if case.kind not in _NAMELESS or found.verdict == "consistent":
         return None, None, None
     what = concealed.physics[0][0]
-    if any(effect.name in what.names for effect in found.effects):
+    if not case.hidden and any(effect.name in what.names for effect in found.effects):
         return True, True, True
     first = found.unexplained_all[0] if found.unexplained_all else None
     if first is None:
         return False, False, False
+    if case.hidden:
+        return first.link in what.links, None, None
     said = {first.covariate} | set(first.law.covariates if first.law else ())
     return (
         first.link in what.links,
@@ -241,6 +274,7 @@ def table(outcomes: list[Outcome]) -> str:
 
     seen = [o for o in of("catalogue") if o.detectable]
     out = [o for o in of("outside") if o.detectable]
+    hidden = [o for o in of("hidden") if o.detectable]
     clean, faults = of("clean"), of("fault")
     gains = [
         (o.before_px - o.after_px) / (o.before_px - o.oracle_px)
@@ -266,6 +300,10 @@ def table(outcomes: list[Outcome]) -> str:
         ),
         ("... held-out gain over the oracle's, median",
          f"{np.median(gains):.2f} of {len(gains)}" if gains else "-"),
+        ("hidden from the catalogue: a wrong name",
+         share(hidden, [bool(o.false_names) for o in hidden])),
+        ("... unexplained, no name, in the right link",
+         share(hidden, [o.right and bool(o.link_right) for o in hidden])),
         ("predictions worse than before", share(outcomes, worse)),
         ("faults: what is named", share(faults, [o.right for o in faults])),
         ("faults: from which frame on",
@@ -293,7 +331,7 @@ def _is_clean(o: Outcome) -> bool:
 def main() -> None:
     """Run what was asked for and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    for kind in ("clean", "catalogue", "outside", "faults"):
+    for kind in ("clean", "catalogue", "outside", "faults", "hidden"):
         parser.add_argument(f"--{kind}", type=int, default=0, metavar="N")
     parser.add_argument("--results", type=Path, default=Path("discovery-benchmark.jsonl"))
     asked = parser.parse_args()
@@ -307,6 +345,7 @@ def main() -> None:
         ("catalogue", asked.catalogue),
         ("outside", asked.outside),
         ("fault", asked.faults),
+        ("hidden", asked.hidden),
     ):
         every = cases(kind)
         for case in (next(every) for _ in range(count)):

@@ -29,6 +29,7 @@ from calib.discovery.log_consistency.branches import choose_branches, with_branc
 from calib.discovery.log_consistency.mixup import Mixup
 from calib.discovery.log_repair import LogRepair, repair_log
 from calib.discovery.pictures import fit_blur, told_of
+from calib.discovery.prediction_gate import Dropped, drop_what_predicts_worse
 from calib.discovery.prove import held_out, prediction_rms_px, prove
 from calib.discovery.rejections import LostFrames, lost_frames
 from calib.discovery.residual_structure import ResidualStructure, find_residual_structure
@@ -78,7 +79,12 @@ def diagnose(
     else:
         search.force(forced)
         structure = ResidualStructure(search, ())
+    dropped: tuple[Dropped, ...] = ()
+    if forced is None:
+        unseen_views = repaired.views.take(held)
+        structure, dropped = drop_what_predicts_worse(structure, before, unseen_views)
     found = _diagnosis(repaired, held, before, structure)
+    found = replace(found, said=(*found.said, *map(str, dropped)))
     return _with_lost_frames(found, lost_frames(repaired.rejected, views.frame))
 
 

@@ -94,11 +94,20 @@ class Fitter:
         noise: Noise,
         own_error: FloatArray | None = None,
         weight: FloatArray | None = None,
+        *,
+        fixed_noise: bool = False,
     ) -> JointFit:
         """Fit the cell, with whatever effects it has; the corners' weights too if not given."""
         if self.has_robot:
-            unknowns = unknowns_of(model)
-            return fit_joint(model, self.views, unknowns, noise, own_error=own_error, weight=weight)
+            return fit_joint(
+                model,
+                self.views,
+                unknowns_of(model),
+                noise,
+                own_error=own_error,
+                fixed_noise=fixed_noise,
+                weight=weight,
+            )
         unheard = replace(noise, flange_m=UNKNOWN_POSE[0], flange_rad=UNKNOWN_POSE[1])
         unknowns = unknowns_of(model, poses=False)
         return fit_joint(

@@ -2,9 +2,12 @@
 
 import os
 import stat
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from numba.core.caching import IndexDataCacheFile
 
 from cell import compiled
 
@@ -67,3 +70,39 @@ def test_what_was_compiled_from_other_files_is_forgotten(
     compiled.forget_stale()
     assert not ours.exists()
     assert other.exists()
+
+
+def test_machine_code_is_forgotten_with_its_index(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(compiled.VARIABLE, str(tmp_path))
+    index = tmp_path / "solver" / "accumulate._accumulate-72.py311.nbi"
+    machine_code = index.with_name("accumulate._accumulate-72.py311.1.nbc")
+    others = index.with_name("accumulate._accumulated-9.py311.1.nbc")
+    index.parent.mkdir()
+    for kept in (index, machine_code, others):
+        kept.touch()
+    (tmp_path / "calibration-cell.kernels").write_text("of an older version", encoding="ascii")
+    compiled.forget_stale()
+    assert not index.exists()
+    assert not machine_code.exists()
+    assert others.exists()
+
+
+def test_first_users_at_once_do_not_take_each_others_machine_code(tmp_path: Path) -> None:
+    """Each signature's file is its own, whoever wrote at the same time."""
+    compiled.write_in_turn()
+    writers, signatures = 6, 12
+    start = threading.Barrier(writers)
+
+    def write(writer: int) -> None:
+        start.wait()
+        for k in range(signatures):
+            key = f"{writer}-{k}"
+            IndexDataCacheFile(str(tmp_path), "kernel-1.py311", "stamp").save(key, key)
+
+    with ThreadPoolExecutor(writers) as pool:
+        list(pool.map(write, range(writers)))
+    kept = IndexDataCacheFile(str(tmp_path), "kernel-1.py311", "stamp")
+    keys = [f"{writer}-{k}" for writer in range(writers) for k in range(signatures)]
+    assert [kept.load(key) for key in keys] == keys
