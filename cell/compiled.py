@@ -121,9 +121,10 @@ def _alone_in(folder: Path) -> Iterator[None]:
 
 def write_in_turn() -> None:
     """Let numba read an index, take a number and write both files with nobody else at it."""
-    from numba.core.caching import IndexDataCacheFile
+    from numba.core import caching
 
-    save = IndexDataCacheFile.save
+    files: Any = caching.IndexDataCacheFile
+    save = files.save
     if save.__module__ == __name__:
         return
 
@@ -131,7 +132,7 @@ def write_in_turn() -> None:
         with _alone_in(Path(self._cache_path)):
             save(self, key, data)
 
-    IndexDataCacheFile.save = save_alone
+    files.save = save_alone
 
 
 def _kept() -> bool:
