@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from cell.cli.board import board
 from cell.cli.bootstrap import bootstrap
 from cell.cli.calibrate import calibrate
 from cell.cli.compare import compare
@@ -17,6 +18,7 @@ from cell.cli.diagnose import diagnose
 from cell.cli.doctor import doctor
 from cell.cli.export import export
 from cell.cli.importing import import_
+from cell.cli.init import init
 from cell.cli.page_option import WithPage
 from cell.cli.plan import plan
 from cell.cli.run import run
@@ -51,6 +53,8 @@ VERBS: dict[str, Callable[..., None]] = {
     "import": import_,
     "study": study,
     "doctor": doctor,
+    "init": init,
+    "board": board,
 }
 
 

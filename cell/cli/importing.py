@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from calib.mount import Mount
 from cell.cli.json_flag import JsonFlag
-from cell.errors import BadAnswer, InputError
+from cell.errors import BadAnswer
 from cell.storage.files.results import new_folder
 from cell.verbs.importing import RotationName, Unit
 from cell.views.terminal.output import say, show
@@ -56,12 +56,13 @@ def import_(
     as_json: JsonFlag = False,
 ) -> None:
     """Turn images and poses of another tool's layout into a recording, corners found."""
+    from cell.storage.files.board_words import parse_board
     from cell.verbs.importing.conventions import Said
     from cell.verbs.importing.importer import Described, import_source
     from cell.views.terminal.progress import counted_progress
 
     described = Described(
-        board=None if board is None else parse_board(board),
+        board=None if board is None else parse_board(board).model_dump(),
         poses=poses,
         joints=joints,
         said=Said(rotation, unit, inverted),
@@ -85,37 +86,3 @@ def import_(
         raise BadAnswer(
             "\n".join(f"THE PICTURES SPEAK AGAINST IT: {words}" for words in imported.contradicted)
         )
-
-
-def parse_board(text: str) -> dict[str, Any]:
-    """A board as said on the command line, in the words of `recording.yaml`.
-
-    Raises
-    ------
-    InputError
-        It cannot be read.
-    """
-    try:
-        if text.startswith("charuco:"):
-            sizes, _, dictionary = text.removeprefix("charuco:").partition(":")
-            squares_x, squares_y, square, marker = sizes.split("x")
-            return {
-                "type": "charuco",
-                "squares_x": int(squares_x),
-                "squares_y": int(squares_y),
-                "square_m": float(square),
-                "marker_m": float(marker),
-                "dictionary": dictionary or "DICT_6X6_250",
-            }
-        rows, cols, square = text.split("x")
-        return {
-            "type": "chessboard",
-            "rows": int(rows),
-            "cols": int(cols),
-            "square_m": float(square),
-        }
-    except ValueError:
-        raise InputError(
-            f"--board {text}: is not understood; give ROWSxCOLSxSQUARE_M such as 6x9x0.025, or"
-            " charuco:5x7x0.036x0.018:DICT_6X6_250"
-        ) from None

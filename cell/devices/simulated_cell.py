@@ -12,6 +12,7 @@ from calib.chain.model import CellModel
 from calib.chain.optics import OPTICS, optics_row
 from calib.views import FloatArray, Views
 from cell.devices.log_mixups import MIXUPS
+from cell.devices.nominal_cell import nominal
 from cell.errors import InputError
 from cell.sequencer.guard import Guard
 from cell.storage.files.camera_file import Lens
@@ -35,7 +36,7 @@ def simulated_cell(
     Parameters
     ----------
     cell:
-        Needs its `simulation` section.
+        With the truth in `simulation`; as its `layout` says where there is none.
     home_rad:
         (6,) joint angles the arm stands at first.
     seed:
@@ -44,14 +45,10 @@ def simulated_cell(
     Raises
     ------
     InputError
-        The section is missing, or names an effect or a column that does not exist.
+        Neither section is there, or one names an effect or a column that does not exist.
     """
-    truth = cell.simulation
-    if truth is None:
-        raise InputError(
-            f"cell {cell.name}: has no section `simulation`; a simulated run needs the truth to"
-            " simulate. See configs/ for examples."
-        )
+    truth = nominal(cell).simulation
+    assert truth is not None
     noise = truth.noise
     return SimulatedCell(
         name=cell.name,

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from calib.chain.effect import Present
 from calib.views import Views
 from cell.devices.factory import simulated_devices
 from cell.devices.log_mixups import MIXUPS, slip
+from cell.devices.nominal_cell import nominal
 from cell.devices.simulated_cell import home_of, log_of, present_effect, simulated_cell
 from cell.errors import BadAnswer, InputError
 from cell.sequencer.session import header_of, record_plan
@@ -108,14 +110,28 @@ def with_effects(plan: Plan, effects: tuple[str, ...]) -> Plan:
     InputError
         An effect, a law or a parameter is unknown, or a value is no number.
     """
-    truth = plan.cell.simulation
-    if not effects or truth is None:
+    if not effects:
         return plan
+    truth = nominal(plan.cell).simulation
+    assert truth is not None
     parsed = tuple(parse_effect(text) for text in effects)
     for effect in parsed:
         if effect.name not in MIXUPS:
-            present_effect(effect, "--effect")
+            _require_amount(present_effect(effect, "--effect"))
     return with_truth(plan, truth.model_copy(update={"effects": parsed}))
+
+
+def _require_amount(effect: Present) -> None:
+    """Refuse an effect whose every amount is zero: the simulation would be that without it."""
+    if not effect.absent:
+        return
+    amounts = [
+        f"{p.name}=NUMBER ({p.unit})" for p in effect.effect.parameters if p.role == "amount"
+    ]
+    raise InputError(
+        f"--effect {effect.effect.name}: has no amount, so it would change nothing; say how large it is:"
+        f" --effect {effect.effect.name}:{' or '.join(amounts[:6])}"
+    )
 
 
 def with_truth(plan: Plan, truth: Simulation) -> Plan:

@@ -13,6 +13,7 @@ from calib.detection import Detection, detect
 from calib.views import Board
 from cell.errors import InputError
 from cell.storage.recording.corners import Corners
+from cell.storage.recording.frames import FrameRecord
 from cell.storage.recording.recording import Recording
 
 log = logging.getLogger(__name__)
@@ -28,7 +29,7 @@ def detect_corners(recording: Recording, progress: Progress | None = None) -> Co
     reason; it never stops the others.
     """
     usable = [frame for frame in recording.frames if frame.frame not in recording.rejected]
-    pictures = [(frame.frame, partial(recording.image, frame)) for frame in usable]
+    pictures = [(frame.frame, partial(_of_size, recording, frame)) for frame in usable]
     found = detect_in_pictures(pictures, recording.board, progress)
     return found.without(recording.rejected)
 
@@ -62,6 +63,22 @@ def _detect(load: Load, board: Board) -> Detection | str:
     except InputError as error:
         return str(error)
     return result if isinstance(result, Detection) else result.reason
+
+
+def _of_size(recording: Recording, frame: FrameRecord) -> NDArray[Any]:
+    """A frame's picture; `InputError` where it has not the size of the recording's camera.
+
+    A picture of another size comes from another camera, another binning or region, or was scaled:
+    its pixels are not those of the other pictures.
+    """
+    image = recording.image(frame)
+    found, camera = (image.shape[1], image.shape[0]), recording.size_px
+    if found != camera:
+        raise InputError(
+            f"the picture has {found[0]}x{found[1]} pixels, and the recording's camera"
+            f" {camera[0]}x{camera[1]}: another camera, binning or region, or a scaled picture"
+        )
+    return image
 
 
 def corners_of(recording: Recording, progress: Progress | None = None) -> Corners:

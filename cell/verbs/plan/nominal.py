@@ -12,10 +12,9 @@ from calib.chain.effects import make_effect
 from calib.chain.model import CellModel
 from calib.solver.noise import Noise
 from calib.views import FloatArray, Views
-from cell.devices.planned_camera import PlannedCamera
+from cell.devices.nominal_cell import nominal
 from cell.devices.simulated_cell import simulated_cell
-from cell.errors import InputError
-from cell.storage.files.cell_file import CellFile, Simulation
+from cell.storage.files.cell_file import CellFile
 from cell.verbs.plan.reach import layout_of
 from sim.cell import SimulatedCell
 
@@ -23,22 +22,6 @@ USUAL_NOISE = Noise(corner_px=0.1, flange_m=3e-5, flange_rad=1e-4)
 """A good detector and an arm of this class; taken where the cell file does not tell."""
 
 _STANDS = ("fixed", "manual")
-
-
-def nominal(cell: CellFile) -> CellFile:
-    """The cell with a `simulation` section: its own, or what its layout says."""
-    if cell.simulation is not None:
-        return cell
-    if cell.layout is None:
-        raise InputError(
-            f"cell {cell.name}: says neither `layout` nor `simulation`, so nobody knows what the"
-            " camera sees; measure the layout with a tape"
-        )
-    alpha = PlannedCamera.of(cell).alpha_px
-    u0, v0 = 0.5 * (cell.camera.width - 1), 0.5 * (cell.camera.height - 1)
-    optics = {"alpha_px": alpha, "beta_px": alpha, "u0_px": u0, "v0_px": v0}
-    truth = Simulation(mounted=cell.layout.mounted, fixed=cell.layout.fixed, optics=optics)
-    return cell.model_copy(update={"simulation": truth})
 
 
 def assumed_noise(cell: CellFile) -> tuple[Noise, str]:

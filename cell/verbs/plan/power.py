@@ -13,11 +13,12 @@ from rich.console import Group
 from rich.table import Table
 
 from calib.discovery.design.power import EffectPower, Power, alike, plan_power
+from cell.devices.nominal_cell import nominal
 from cell.devices.simulated_cell import home_of, log_of, simulated_cell
 from cell.storage.files.plan_file import SCHEMA as PLAN_SCHEMA
 from cell.storage.files.plan_file import Plan, read_plan
 from cell.storage.files.yaml_model import read_mapping
-from cell.verbs.plan.nominal import assumed_noise, nominal
+from cell.verbs.plan.nominal import assumed_noise
 
 _WIDTH = 100
 

@@ -1,0 +1,44 @@
+"""A board as it is said on the command line."""
+
+from __future__ import annotations
+
+from pydantic import TypeAdapter, ValidationError
+
+from cell.errors import InputError
+from cell.storage.files.board_file import BoardFile
+
+_BOARD: TypeAdapter[BoardFile] = TypeAdapter(BoardFile)
+EXAMPLES = "7x10x0.025 or charuco:5x7x0.036x0.018:DICT_6X6_250"
+
+
+def parse_board(text: str) -> BoardFile:
+    """ROWSxCOLSxSQUARE_M, or charuco:SQUARES_XxSQUARES_YxSQUARE_MxMARKER_M:DICTIONARY.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or is no board.
+    """
+    try:
+        return _BOARD.validate_python(_mapping(text))
+    except ValidationError as invalid:
+        faults = "; ".join(f"{e['loc'][-1]}: {e['msg']}" for e in invalid.errors())
+        raise InputError(f"--board {text}: {faults}; give it like {EXAMPLES}") from None
+    except ValueError:
+        raise InputError(f"--board {text}: is not understood; give it like {EXAMPLES}") from None
+
+
+def _mapping(text: str) -> dict[str, object]:
+    if text.startswith("charuco:"):
+        sizes, _, dictionary = text.removeprefix("charuco:").partition(":")
+        squares_x, squares_y, square, marker = sizes.split("x")
+        return {
+            "type": "charuco",
+            "squares_x": int(squares_x),
+            "squares_y": int(squares_y),
+            "square_m": float(square),
+            "marker_m": float(marker),
+            "dictionary": dictionary or "DICT_6X6_250",
+        }
+    rows, cols, square = text.split("x")
+    return {"type": "chessboard", "rows": int(rows), "cols": int(cols), "square_m": float(square)}

@@ -1,0 +1,175 @@
+"""The cell file of a bench: consistent in itself, so that a plan can be made of it at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from calib.chain.kinematics import MODELS, UnknownArm, arm
+from cell.errors import InputError
+from cell.storage.files.cell_file import SCHEMA, CellFile
+from cell.storage.files.parts import Pose
+from cell.storage.files.writing import yaml_text
+from cell.verbs.init.answers import HOMES_DEG, Answers
+
+FILE_NAME = "cell.yaml"
+_FILLS = (0.25, 0.75)
+"""Share of the picture's shorter side that the board's longer one takes, far and near."""
+
+_SPAN_M = (0.25, 0.9)
+"""Distances at which arms of this size can show a board tilted."""
+
+_HEAD = (
+    "# Made by `cell init`. Measure `layout` with a tape before the arm moves, to a centimetre or\n"
+    "# two. Then: cell doctor FILE, cell plan FILE, cell run PLAN --dry-run\n"
+)
+
+
+def cell_of(answers: Answers) -> CellFile:
+    """The cell of these answers.
+
+    Raises
+    ------
+    InputError
+        An answer cannot be, or the board would not be where the arm can look at it.
+    """
+    home = answers.home_deg or _home(answers.model)
+    distances = answers.distances_m or _distances(answers)
+    data: dict[str, Any] = {
+        "schema": SCHEMA,
+        "name": answers.name,
+        "robot": _robot(answers),
+        "camera": _camera(answers),
+        "board": dict(answers.board),
+        "mount": answers.mount,
+        "layout": {
+            "mounted": _pose(answers.camera_at),
+            "fixed": _pose(answers.board_at)
+            if answers.board_at is not None
+            else _seen_from_home(answers, home, float(np.mean(distances))),
+            "home_deg": list(home),
+            "distances_m": list(distances),
+        },
+    }
+    try:
+        return CellFile.model_validate(data)
+    except ValidationError as invalid:
+        faults = "\n".join(
+            f"{'.'.join(map(str, e['loc']))}: {e['msg'].removeprefix('Value error, ')}"
+            for e in invalid.errors()
+        )
+        raise InputError(faults) from None
+
+
+def write_cell(cell: CellFile, folder: Path) -> Path:
+    """Write `cell.yaml` into a folder; raises `InputError` where one is there or cannot be."""
+    path = folder / FILE_NAME
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with path.open("x", encoding="utf-8") as file:
+            file.write(_HEAD + yaml_text(cell.as_mapping()))
+    except FileExistsError:
+        raise InputError(f"{path}: is there already and is never overwritten") from None
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be written: {fault.strerror}") from None
+    return path
+
+
+def _home(model: str) -> tuple[float, ...]:
+    for letters, home in HOMES_DEG.items():
+        if model.startswith(letters):
+            return home
+    raise InputError(f"--model {model}: has no usual posture here; say --home with six degrees")
+
+
+def _robot(answers: Answers) -> dict[str, Any]:
+    if answers.model not in MODELS:
+        raise InputError(f"--model {answers.model}: is not known; known are {', '.join(MODELS)}")
+    robot: dict[str, Any] = {"driver": answers.robot, "model": answers.model}
+    if answers.robot != "sim":
+        if answers.robot_address is None:
+            raise InputError(f"--robot {answers.robot}: needs --robot-address")
+        robot["address"] = answers.robot_address
+    return robot
+
+
+def _camera(answers: Answers) -> dict[str, Any]:
+    camera: dict[str, Any] = {
+        "driver": answers.camera,
+        "model": answers.camera_model,
+        "width": answers.width,
+        "height": answers.height,
+        "pixel_size_um": answers.pixel_size_um,
+        "focus": answers.focus,
+        "lens": {"focal_length_mm": answers.focal_length_mm, "f_number": 8.0},
+    }
+    if answers.camera != "sim":
+        if answers.camera_address is None:
+            raise InputError(f"--camera {answers.camera}: needs --camera-address")
+        key = "producer" if answers.camera == "genicam" else "address"
+        camera[key] = answers.camera_address
+    return camera
+
+
+def _distances(answers: Answers) -> tuple[float, float]:
+    """From where the board fills the picture to where it takes a quarter of it."""
+    alpha = 1e3 * answers.focal_length_mm / answers.pixel_size_um
+    board = _longer_side_m(answers)
+    shorter = min(answers.width, answers.height)
+    far, near = (alpha * board / (share * shorter) for share in _FILLS)
+    near, far = max(near, _SPAN_M[0]), min(far, _SPAN_M[1])
+    if far < 1.1 * near:
+        raise InputError(
+            f"the board of {board:.2f} m fits this lens' picture only from {near:.2f} m on, farther"
+            " than an arm shows it tilted: take a smaller board or a shorter lens, or say"
+            " --distances NEAR,FAR"
+        )
+    return round(near, 2), round(far, 2)
+
+
+def _longer_side_m(answers: Answers) -> float:
+    board = answers.board
+    squares = (
+        max(board["rows"], board["cols"]) + 1
+        if board["type"] == "chessboard"
+        else max(board["squares_x"], board["squares_y"])
+    )
+    return float(squares * board["square_m"])
+
+
+def _transform(numbers: tuple[float, ...]) -> RigidTransform:
+    if len(numbers) != 6:
+        raise InputError("a place is x,y,z in metres and roll,pitch,yaw in degrees: six numbers")
+    turn = Rotation.from_euler("xyz", numbers[3:], degrees=True)
+    return RigidTransform.from_components(numbers[:3], turn)
+
+
+def _pose(numbers: tuple[float, ...]) -> dict[str, Any]:
+    return Pose.of(_transform(numbers)).model_dump(mode="json", exclude_none=True)
+
+
+def _seen_from_home(answers: Answers, home: tuple[float, ...], distance_m: float) -> dict[str, Any]:
+    """base_from_fixed with the board's middle straight before the camera at home, square to it."""
+    try:
+        flange = RigidTransform.from_matrix(arm(answers.model).forward(np.radians(home)))
+    except UnknownArm as fault:
+        raise InputError(f"--model {answers.model}: {fault}") from None
+    rows, cols = _corners(answers)
+    square = answers.board["square_m"]
+    middle = np.array([(cols - 1) * square / 2, (rows - 1) * square / 2, 0.0])
+    camera_from_board = RigidTransform.from_translation(np.array([0.0, 0.0, distance_m]) - middle)
+    mounted = flange * _transform(answers.camera_at)
+    hand = answers.mount == "eye_in_hand"
+    fixed = mounted * (camera_from_board if hand else camera_from_board.inv())
+    return Pose.of(fixed).model_dump(mode="json", exclude_none=True)
+
+
+def _corners(answers: Answers) -> tuple[int, int]:
+    board = answers.board
+    if board["type"] == "chessboard":
+        return board["rows"], board["cols"]
+    return board["squares_y"] - 1, board["squares_x"] - 1
