@@ -129,8 +129,8 @@ def _require_amount(effect: Present) -> None:
         f"{p.name}=NUMBER ({p.unit})" for p in effect.effect.parameters if p.role == "amount"
     ]
     raise InputError(
-        f"--effect {effect.effect.name}: has no amount, so it would change nothing; say how large it is:"
-        f" --effect {effect.effect.name}:{' or '.join(amounts[:6])}"
+        f"--effect {effect.effect.name}: has no amount and would change nothing; say how large it"
+        f" is: --effect {effect.effect.name}:{' or '.join(amounts[:6])}"
     )
 
 
