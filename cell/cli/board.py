@@ -28,9 +28,9 @@ def board(
 ) -> None:
     """Draw the calibration board at scale, with a ruler, and say how to check the print."""
     from cell.storage.files.board_words import parse_board
-    from cell.verbs.board import draw_board, words_about
+    from cell.verbs.board import draw_board, how_to_check
 
     described = parse_board(board)
     page_mm = draw_board(described.board(), output, paper)
     result = {"file": str(output), "page_mm": page_mm, "board": described.model_dump()}
-    show(words_about(described.board(), output, page_mm), result, as_json=as_json)
+    show(how_to_check(described.board(), output, page_mm), result, as_json=as_json)

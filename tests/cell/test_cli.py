@@ -122,6 +122,7 @@ def test_effects_on_the_command_line_take_the_place_of_the_cells_own(
         ("focus_breathing:law=inverse_square,k=3", "has no parameter 'k'"),
         ("focus_breathing:law=inverse_square,k_px_m2=x", "is no number"),
         ("focus_breathing:law", "is no key=value"),
+        ("lens_sag", "has no amount and would change nothing"),
     ],
 )
 def test_an_effect_that_is_not_understood(
@@ -147,7 +148,7 @@ def test_slips_of_the_log_change_poses_and_not_corners(
     cell: Cell, tmp_path: Path, effect: str
 ) -> None:
     plan = ROOT / "configs" / "ur3-robotiq.plan.yaml"
-    for name, effects in (("true", "lens_sag"), ("slip", effect)):
+    for name, effects in (("true", "length_unit:metres_per_unit=1"), ("slip", effect)):
         said = cell("simulate", plan, "-o", tmp_path / name, "--effect", effects)
         assert said.status == 0, said.err
     true, slip = (read_recording(tmp_path / name).views() for name in ("true", "slip"))

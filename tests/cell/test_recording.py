@@ -19,6 +19,7 @@ from cell.storage.recording import (
     Corners,
     FrameRecord,
     RecordingWriter,
+    detect_corners,
     read_recording,
     write_corners,
 )
@@ -146,6 +147,17 @@ def test_size_comes_from_a_picture_where_the_header_does_not_tell(recording_fold
     folder = recording_folder(header=header, frames=frame_line(0, image="a.png"))
     cv2.imwrite(str(folder / "a.png"), np.zeros((30, 40), np.uint8))
     assert read_recording(folder).size_px == (40, 30)
+
+
+def test_a_picture_of_another_size_is_another_camera_s(recording_folder: Folder) -> None:
+    lines = "".join(frame_line(k, image=f"{k}.png") for k in range(3))
+    folder = recording_folder(frames=lines)
+    for k, size in enumerate([(48, 64), (24, 32), (48, 64)]):
+        cv2.imwrite(str(folder / f"{k}.png"), np.full(size, 200, dtype=np.uint8))
+    found = detect_corners(read_recording(folder))
+    assert "has 32x24 pixels, and the recording's camera 64x48" in found.rejected[1]
+    assert "another camera, binning or region, or a scaled picture" in found.rejected[1]
+    assert not any("pixels, and" in found.rejected[k] for k in (0, 2))
 
 
 def test_a_picture_is_decoded_once_for_corners_and_report(

@@ -1,5 +1,5 @@
 """`cell board`: the board to print, at scale."""
 
-from cell.verbs.board.sheet import SUFFIXES, draw_board, words_about
+from cell.verbs.board.sheet import draw_board, how_to_check
 
-__all__ = ["SUFFIXES", "draw_board", "words_about"]
+__all__ = ["draw_board", "how_to_check"]

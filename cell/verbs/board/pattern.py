@@ -9,9 +9,7 @@ import numpy as np
 
 from calib.views import Board
 from cell.errors import InputError
-
-Rectangle = tuple[float, float, float, float]
-"""Left, top, width, height."""
+from cell.verbs.board.vector_page import Rectangle
 
 
 def size_mm(board: Board) -> tuple[float, float]:

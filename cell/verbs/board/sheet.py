@@ -1,17 +1,15 @@
-"""The sheet: the board at scale with its quiet zone, a ruler, and how to check the print."""
+"""The sheet to print: the board at scale with its quiet zone, a ruler and its description."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from calib.views import Board
 from cell.errors import InputError
 from cell.storage.files.board_file import board_file
+from cell.storage.whole import whole_file
 from cell.verbs.board.pattern import dark, size_mm
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from cell.verbs.board.vector_page import Line, VectorPage
 
 SUFFIXES = (".pdf", ".svg")
 PAPERS_MM = {
@@ -23,13 +21,15 @@ PAPERS_MM = {
     "letter": (215.9, 279.4),
     "tabloid": (279.4, 431.8),
 }
-_MM_PER_INCH = 25.4
 _RULER_MM = 100.0
 _FOOT_MM = 26.0
 """Ruler and words below the quiet zone."""
 
 _MARGIN_MM = 6.0
 """Printers leave so much of the paper white."""
+
+_TEXT_WIDTH_MM = 150.0
+"""The longest line of the foot."""
 
 
 def draw_board(board: Board, path: Path, paper: str | None = None) -> tuple[float, float]:
@@ -47,37 +47,63 @@ def draw_board(board: Board, path: Path, paper: str | None = None) -> tuple[floa
     InputError
         It does not fit the paper, is no such file, or cannot be written.
     """
-    if path.suffix.lower() not in SUFFIXES:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
         raise InputError(f"-o {path}: must end with {' or '.join(SUFFIXES)}")
+    page = sheet(board, paper)
+    with whole_file(path) as file:
+        file.write(page.pdf() if suffix == ".pdf" else page.svg())
+    return page.width_mm, page.height_mm
+
+
+def sheet(board: Board, paper: str | None = None) -> VectorPage:
+    """The page with the board in its middle, a square's width of white around it."""
     wide, high = size_mm(board)
     quiet = 1e3 * board.square_m
-    least = (wide + 2 * quiet, high + 2 * quiet + _FOOT_MM)
-    page = _page(least, paper)
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Rectangle
+    page = _page((wide + 2 * quiet, high + 2 * quiet + _FOOT_MM), paper)
+    left, top = (page[0] - wide) / 2, (page[1] - _FOOT_MM - high) / 2
+    foot = (max(min(left, page[0] - _TEXT_WIDTH_MM - _MARGIN_MM), _MARGIN_MM), page[1] - _FOOT_MM)
+    words = (
+        "ruler: 100 mm. Print at 100 %, not fitted to the page.",
+        description(board),
+        "The corner nearest to the top left of the pattern is row 0, col 0.",
+    )
+    return VectorPage(
+        title=f"calibration board, {description(board)}",
+        width_mm=page[0],
+        height_mm=page[1],
+        rectangles=tuple((left + x, top + y, w, h) for x, y, w, h in dark(board)),
+        lines=_ruler(foot[0], foot[1] + 8.0),
+        texts=tuple((foot[0], foot[1] + 12.5 + 4.0 * k, text) for k, text in enumerate(words)),
+    )
 
-    figure = Figure(figsize=(page[0] / _MM_PER_INCH, page[1] / _MM_PER_INCH))
-    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    ax.set(xlim=(0, page[0]), ylim=(page[1], 0))
-    ax.set_axis_off()
-    left = (page[0] - wide) / 2
-    top = (page[1] - _FOOT_MM - high) / 2
-    for x, y, width, height in dark(board):
-        corner = (left + x, top + y)
-        ax.add_patch(
-            Rectangle(corner, width, height, color="black", linewidth=0, antialiased=False)
-        )
-    _foot(ax, board, (max(left, _MARGIN_MM), page[1] - _FOOT_MM))
-    try:
-        figure.savefig(path, metadata={"Title": f"calibration board {_name(board)}"})
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be written: {fault.strerror}") from None
-    return page
+
+def description(board: Board) -> str:
+    """The board as a cell file has it."""
+    fields = board_file(board).model_dump()
+    return "board: {" + ", ".join(f"{key}: {value}" for key, value in fields.items()) + "}"
+
+
+def how_to_check(board: Board, path: Path, page_mm: tuple[float, float]) -> str:
+    """The description for the cell file, and how to print, check and mount the sheet."""
+    wide, high = size_mm(board)
+    cols, rows = board.cols + 1, board.rows + 1
+    return (
+        f"{path}: {page_mm[0]:.1f} x {page_mm[1]:.1f} mm, pattern {wide:.1f} x {high:.1f} mm\n"
+        f"for the cell file:\n  {description(board)}\n"
+        "print it at 100 %, not fitted to the page, and measure the print:\n"
+        f"  ruler 100.0 mm; {cols} squares along a row {wide:.1f} mm, {rows} along a column"
+        f" {high:.1f} mm\n"
+        f"  another length: square_m is that of the {cols} squares divided by {cols}; rows and"
+        " columns that differ by more than 0.1 %: another printer\n"
+        "glue it on a stiff flat plate without bubbles; keep the white edge free, it is the quiet"
+        " zone"
+    )
 
 
 def _page(least: tuple[float, float], paper: str | None) -> tuple[float, float]:
     if paper is None:
-        return max(least[0], _RULER_MM + 2 * _MARGIN_MM), least[1]
+        return max(least[0], _TEXT_WIDTH_MM + 2 * _MARGIN_MM), least[1]
     if paper.lower() not in PAPERS_MM:
         raise InputError(f"--paper {paper}: is not known; known are {', '.join(PAPERS_MM)}")
     short, long = PAPERS_MM[paper.lower()]
@@ -90,37 +116,8 @@ def _page(least: tuple[float, float], paper: str | None) -> tuple[float, float]:
     )
 
 
-def _foot(ax: Axes, board: Board, at: tuple[float, float]) -> None:
-    """A ruler with a tick every 10 mm, and the board in words."""
-    left, top = at
-    line = top + 8.0
-    ax.plot([left, left + _RULER_MM], [line, line], color="black", linewidth=0.5)
-    for k in range(11):
-        x = left + 10.0 * k
-        ax.plot([x, x], [line - (4.0 if k % 5 == 0 else 2.5), line], color="black", linewidth=0.5)
-    ax.text(left, line + 4.5, "ruler: 100 mm. Print at 100 %, not fitted to the page.", fontsize=7)
-    ax.text(left, line + 9.0, _name(board), fontsize=7)
-    ax.text(left, line + 13.5, "The top left corner of the pattern is row 0, col 0.", fontsize=7)
-
-
-def _name(board: Board) -> str:
-    said = board_file(board).model_dump()
-    return "board: {" + ", ".join(f"{key}: {value}" for key, value in said.items()) + "}"
-
-
-def words_about(board: Board, path: Path, page_mm: tuple[float, float]) -> str:
-    """The description for the cell file, and how to print, check and mount it."""
-    wide, high = size_mm(board)
-    squares = board.cols + 1
-    return (
-        f"{path}: {page_mm[0]:.1f} x {page_mm[1]:.1f} mm, pattern {wide:.1f} x {high:.1f} mm\n"
-        f"for the cell file:\n  {_name(board)}\n"
-        "print it at 100 % (no fitting, no scaling) on matt paper or have it printed on a plate;"
-        " then measure:\n"
-        f"  the ruler must be 100.0 mm; {squares} squares from edge to edge {wide:.1f} mm along the"
-        f" rows, {board.rows + 1} squares {high:.1f} mm along the columns\n"
-        f"  where it is not: write square_m as the measured length over {squares} into the cell"
-        " file; where rows and columns differ by more than 0.1 %, print on another printer\n"
-        "glue it flat on glass, aluminium honeycomb or a stiff plate, without bubbles, and leave"
-        " the white edge free: it is the quiet zone"
-    )
+def _ruler(left: float, line: float) -> tuple[Line, ...]:
+    """A line of 100 mm with a tick every 10 mm."""
+    at = [left + 10.0 * k for k in range(11)]
+    ticks = ((x, line - (4.0 if k % 5 == 0 else 2.5), x, line) for k, x in enumerate(at))
+    return ((left, line, left + _RULER_MM, line), *ticks)

@@ -55,6 +55,7 @@ def cell_of(answers: Answers) -> CellFile:
             "distances_m": list(distances),
         },
     }
+    data |= _bounds(answers)
     try:
         return CellFile.model_validate(data)
     except ValidationError as invalid:
@@ -83,13 +84,17 @@ def _home(model: str) -> tuple[float, ...]:
     for letters, home in HOMES_DEG.items():
         if model.startswith(letters):
             return home
-    raise InputError(f"--model {model}: has no usual posture here; say --home with six degrees")
+    raise InputError(
+        f"--model {model}: has no usual posture here; give --home with six angles in degrees"
+    )
 
 
 def _robot(answers: Answers) -> dict[str, Any]:
     if answers.model not in MODELS:
         raise InputError(f"--model {answers.model}: is not known; known are {', '.join(MODELS)}")
-    robot: dict[str, Any] = {"driver": answers.robot, "model": answers.model}
+    robot: dict[str, Any] = {
+        "driver": answers.robot, "model": answers.model, "payload_kg": answers.payload_kg
+    }  # fmt: skip
     if answers.robot != "sim":
         if answers.robot_address is None:
             raise InputError(f"--robot {answers.robot}: needs --robot-address")
@@ -100,9 +105,8 @@ def _robot(answers: Answers) -> dict[str, Any]:
 def _camera(answers: Answers) -> dict[str, Any]:
     camera: dict[str, Any] = {
         "driver": answers.camera,
-        "model": answers.camera_model,
-        "width": answers.width,
-        "height": answers.height,
+        "width": answers.size_px[0],
+        "height": answers.size_px[1],
         "pixel_size_um": answers.pixel_size_um,
         "focus": answers.focus,
         "lens": {"focal_length_mm": answers.focal_length_mm, "f_number": 8.0},
@@ -115,17 +119,33 @@ def _camera(answers: Answers) -> dict[str, Any]:
     return camera
 
 
+def _bounds(answers: Answers) -> dict[str, Any]:
+    """What the arm stays inside and out of; a simulated arm runs into nothing."""
+    bounds: dict[str, Any] = {"no_workspace_because": answers.no_workspace_because}
+    if answers.workspace is not None:
+        bounds["workspace"] = _box("workspace", answers.workspace)
+    if answers.keep_out is not None:
+        bounds["keep_out"] = [_box(name, corners) for name, corners in answers.keep_out.items()]
+    return bounds
+
+
+def _box(name: str, corners: tuple[float, ...]) -> dict[str, Any]:
+    """A box of two opposite corners, in whichever order they were measured."""
+    low, high = np.minimum(corners[:3], corners[3:]), np.maximum(corners[:3], corners[3:])
+    return {"name": name, "low_m": low.tolist(), "high_m": high.tolist()}
+
+
 def _distances(answers: Answers) -> tuple[float, float]:
     """From where the board fills the picture to where it takes a quarter of it."""
     alpha = 1e3 * answers.focal_length_mm / answers.pixel_size_um
     board = _longer_side_m(answers)
-    shorter = min(answers.width, answers.height)
+    shorter = min(answers.size_px)
     far, near = (alpha * board / (share * shorter) for share in _FILLS)
     near, far = max(near, _SPAN_M[0]), min(far, _SPAN_M[1])
     if far < 1.1 * near:
         raise InputError(
             f"the board of {board:.2f} m fits this lens' picture only from {near:.2f} m on, farther"
-            " than an arm shows it tilted: take a smaller board or a shorter lens, or say"
+            " than an arm shows it tilted: take a smaller board or a shorter lens, or give"
             " --distances NEAR,FAR"
         )
     return round(near, 2), round(far, 2)
