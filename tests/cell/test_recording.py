@@ -19,10 +19,10 @@ from cell.storage.recording import (
     Corners,
     FrameRecord,
     RecordingWriter,
-    detect_corners,
     read_recording,
     write_corners,
 )
+from cell.storage.recording.detect import detect_corners
 from cell.storage.recording.header import Header
 from tests.cell.recordings import HEADER, POSE, corner_rows, frame_line
 
