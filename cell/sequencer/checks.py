@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from calib.detection import Detection, detect, make_ready
 from calib.views import Board
+from cell.errors import InputError
+from cell.storage.files.camera_file import CameraFile
 from cell.storage.files.plan_file import Checks
 
 
@@ -32,6 +34,21 @@ def make_check_ready(checks: Checks) -> None:
     """Have the search for the board compiled: the first frame is judged while the arm moves on."""
     if checks.board:
         make_ready()
+
+
+def check_size(image: NDArray[np.generic], camera: CameraFile) -> None:
+    """Raise `InputError` for a picture that has not the size which the cell file gives.
+
+    Plan, optics and recording count in the cell file's pixels; a camera with another binning or
+    region shows other ones.
+    """
+    height, width = image.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        raise InputError(
+            f"the camera's picture has {width}x{height} pixels, and the cell file says"
+            f" {camera.width}x{camera.height}: set the camera's binning and region to what the cell"
+            " file says, or write this size as camera.width and camera.height, and plan anew"
+        )
 
 
 def check_frame(image: NDArray[np.generic], board: Board, checks: Checks) -> Verdict:

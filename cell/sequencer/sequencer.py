@@ -19,7 +19,7 @@ import numpy as np
 
 from calib.views import FloatArray
 from cell.errors import BadAnswer, DiskFailed, exit_status_of
-from cell.sequencer.checks import Verdict, check_frame, make_check_ready
+from cell.sequencer.checks import Verdict, check_frame, check_size, make_check_ready
 from cell.sequencer.clock import Clock, HostClock
 from cell.sequencer.goal import Goal
 from cell.sequencer.guard import Guard
@@ -312,6 +312,7 @@ class Sequencer:
         states = [self._arm.watch()]
         grab = asked_of_camera(partial(self._camera.grab, timeout_s))
         frame = self._arm.await_job(self._worker.do(grab), states)
+        check_size(frame.image, self._plan.cell.camera)
         states.append(self._arm.reading_after(frame.host_t_s))
         return frame, tuple(states)
 

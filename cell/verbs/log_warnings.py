@@ -41,7 +41,7 @@ def mixup_warnings(mixups: tuple[Mixup, ...]) -> list[dict[str, str]]:
     """The mix-ups in the words of `warnings`."""
     return [
         {
-            "what": mixup.physics,
+            "what": mixup.physics.removesuffix("."),
             "where": f"the log ({mixup.name})",
             "remedy": " ".join(part for part in (mixup.remedy, mixup.apart) if part),
         }

@@ -18,6 +18,7 @@ from calib.errors import CalibrationError
 from calib.handeye import solve_hand_eye
 from calib.views import Views
 from cell.cli import main
+from cell.verbs.log_warnings import log_mixups, mixup_warnings
 from tests.calibration.test_cell_calibrate import _write
 from tests.paper.scene import (
     BASE_FROM_FIXED,
@@ -118,10 +119,26 @@ def test_a_tool_frame_set_midway_is_no_matter_of_units() -> None:
     assert "which picture each is of" in said(found)
 
 
-def test_poses_of_the_other_direction_do_not_go_with_the_pictures() -> None:
-    found = calibrate(with_poses(inverse(VIEWS.base_from_flange)))
+def mixups_said(views: Views, found: Calibration) -> str:
+    return " ".join(f"{w['what']}: {w['remedy']}" for w in mixup_warnings(log_mixups(views, found)))
+
+
+def test_poses_of_the_other_direction_or_another_mount_are_named_as_a_pair() -> None:
+    views = with_poses(inverse(VIEWS.base_from_flange))
+    found = calibrate(views)
     assert undetermined(found) == {"hand_eye"}
-    assert "check" in said(found)
+    words = mixups_said(views, found)
+    assert "it is flange_from_base, the inverse; or they are right, and the recording's" in words
+    assert "`mount` is the wrong one of eye_in_hand and eye_to_hand" in words
+    assert "the camera or the board rides on the flange" in words
+
+
+def test_poses_that_froze_midway_are_named_by_the_calibration() -> None:
+    poses = VIEWS.base_from_flange.copy()
+    poses[6:] = poses[6]
+    views = with_poses(poses)
+    words = mixups_said(views, calibrate(views))
+    assert "stands still from frame 6 to 11 while the pictures go on" in words
 
 
 def test_identical_frames_count_once() -> None:

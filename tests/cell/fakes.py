@@ -108,6 +108,7 @@ class FakeCamera:
         self.calls: list[str] = []
         self.grabs: list[Exception | None] = []
         self.lag_s = 0.0
+        self.size = (480, 640)
 
     def connect(self) -> None:
         self.calls.append("connect")
@@ -125,7 +126,7 @@ class FakeCamera:
         fault = self.grabs.pop(0) if self.grabs else None
         if fault is not None:
             raise fault
-        image = np.full((48, 64), len(self.calls), np.uint8)
+        image = np.full(self.size, len(self.calls), np.uint8)
         return Frame(image, self.now() - self.lag_s, exposure_s=0.01, raw={"id": len(self.calls)})
 
     def close(self) -> None:

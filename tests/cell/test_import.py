@@ -19,6 +19,7 @@ from cell.verbs.importing.importer import Described, import_source
 from cell.verbs.importing.pairing import Pairing
 from cell.verbs.importing.pose_files import read_poses
 from cell.verbs.importing.raw import RawPose
+from cell.verbs.importing.sources import common_size_px
 
 TURN = Rotation.from_rotvec([0.3, -0.5, 0.9])
 P_M = np.array([0.4, -0.2, 0.6])
@@ -219,3 +220,14 @@ def test_a_recording_is_copied_whole(tmp_path: Path) -> None:
     original, copy = read_recording(tmp_path / "r"), read_recording(tmp_path / "copy")
     assert copy.frames == original.frames
     np.testing.assert_array_equal(copy.views().corners_px, original.views().corners_px)
+
+
+def test_pictures_of_another_size_are_left_out_with_a_word(tmp_path: Path) -> None:
+    sizes = [(24, 32), (48, 64), (48, 64), (12, 16), (48, 64)]
+    files = [tmp_path / f"{k}.png" for k in range(len(sizes))]
+    for path, size in zip(files, sizes, strict=True):
+        cv2.imwrite(str(path), np.full(size, 200, dtype=np.uint8))
+    size_px, notes = common_size_px(files)
+    assert size_px == (64, 48)
+    assert "1 of 32x24, 1 of 16x12 are left out" in notes[0]
+    assert common_size_px(files[1:3]) == ((64, 48), ())

@@ -135,6 +135,14 @@ def test_every_view_is_logged_with_the_pose_of_its_frame(bench: Bench) -> None:
     assert bench.told[-3].left_s is not None
 
 
+def test_a_picture_of_another_size_than_the_cell_file_says_ends_the_run(bench: Bench) -> None:
+    bench.camera.size = (240, 320)
+    result = bench.run()
+    assert (result.finish, result.frames) == (Finish.BAD_INPUT, 0)
+    assert "has 320x240 pixels, and the cell file says 640x480" in result.reason
+    assert bench.arm.calls[-1] == "close"
+
+
 def test_moves_stay_below_the_plans_speed(bench: Bench) -> None:
     kinematics_speeds = []
     start_move = bench.arm.start_move

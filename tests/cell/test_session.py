@@ -137,4 +137,4 @@ def test_a_killed_run_loses_at_most_the_frame_in_hand(
     assert [frame.frame for frame in recording.frames] == [0, 1, 2, 3]
     for frame, view in zip(recording.frames, make_plan(tmp_path).file.views, strict=True):
         np.testing.assert_allclose(frame.joints_rad, view.joints(), atol=1e-9)
-        assert recording.image(frame).shape == (48, 64)
+        assert recording.image(frame).shape == (480, 640)

@@ -68,6 +68,12 @@ _OTHERS = (
 )
 
 
+_OR_MOUNT = (
+    "; or they are right, and the recording's `mount` is the wrong one of eye_in_hand and"
+    " eye_to_hand: pictures and poses are the same for both, so they cannot decide"
+)
+
+
 @dataclass(frozen=True)
 class ConventionsFound:
     """The mix-ups, and the loop with them mended."""
@@ -125,16 +131,27 @@ def _rotation_mixup(convention: _Convention, before: Closure, after: Closure) ->
     def mend(views: Views, neighbours: Views) -> Views:
         return replace(views, base_from_flange=convention.read(views.base_from_flange))
 
+    inverts = convention.inverts
     return Mixup(
         name="rotation_convention",
-        physics=f"The log's poses are not what they say they are: {convention.words}.",
-        remedy="Correct the program that writes the log; the twin reads it as it should be.",
+        physics=(
+            f"The log's poses are not what they should be: {convention.words}"
+            f"{_OR_MOUNT if inverts else ''}."
+        ),
+        remedy=(
+            "Correct whichever of the two is wrong: `mount` in recording.yaml, or the program that"
+            " writes the log."
+            if inverts
+            else "Correct the program that writes the log; the twin reads it as it should be."
+        ),
         mend=mend,
         evidence=(_miss(before), _miss(after)),
-        alike=("mount",) if convention.inverts else (),
+        alike=("mount",) if inverts else (),
         apart=(
-            "a look at the cell: whether the camera or the board rides on the flange, as the"
-            " recording's key `mount` says"
+            "Look at the cell: whether the camera or the board rides on the flange, as the"
+            " recording's key `mount` says."
+            if inverts
+            else ""
         ),
     )
 

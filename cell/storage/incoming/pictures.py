@@ -52,6 +52,11 @@ def decode_picture(data: bytes, where: str) -> NDArray[np.generic]:
     return image
 
 
+def picture_size_px(path: Path) -> tuple[int, int] | None:
+    """(width, height) as a picture's header says; None where it is of no known format."""
+    return _size_px(read_bytes(path, PICTURE_BYTES))
+
+
 def check_pixels(width_px: int, height_px: int) -> None:
     """Raise `ValueError` where a picture of that size is more than is read."""
     if width_px * height_px > PICTURE_PIXELS:

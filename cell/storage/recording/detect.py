@@ -13,7 +13,6 @@ from calib.detection import Detection, detect
 from calib.views import Board
 from cell.errors import InputError
 from cell.storage.recording.corners import Corners
-from cell.storage.recording.frames import FrameRecord
 from cell.storage.recording.recording import Recording
 
 log = logging.getLogger(__name__)
@@ -29,19 +28,24 @@ def detect_corners(recording: Recording, progress: Progress | None = None) -> Co
     reason; it never stops the others.
     """
     usable = [frame for frame in recording.frames if frame.frame not in recording.rejected]
-    pictures = [(frame.frame, partial(_of_size, recording, frame)) for frame in usable]
-    found = detect_in_pictures(pictures, recording.board, progress)
+    pictures = [(frame.frame, partial(recording.image, frame)) for frame in usable]
+    if not pictures:
+        return Corners({}).without(recording.rejected)
+    found = detect_in_pictures(pictures, recording.board, recording.size_px, progress)
     return found.without(recording.rejected)
 
 
 def detect_in_pictures(
-    pictures: Sequence[tuple[int, Load]], board: Board, progress: Progress | None = None
+    pictures: Sequence[tuple[int, Load]],
+    board: Board,
+    size_px: tuple[int, int],
+    progress: Progress | None = None,
 ) -> Corners:
-    """As `detect_corners`, in pictures with their frame numbers; `InputError` where one is none."""
+    """As `detect_corners`, in pictures of (width, height) pixels with their frame numbers."""
     found: dict[int, Detection] = {}
     rejected: dict[int, str] = {}
     for at, (frame, load) in enumerate(pictures):
-        detection = _detect(load, board)
+        detection = _detect(load, board, size_px)
         if isinstance(detection, Detection):
             found[frame] = detection
         else:
@@ -57,26 +61,25 @@ def detect_in_pictures(
     )
 
 
-def _detect(load: Load, board: Board) -> Detection | str:
+def _detect(load: Load, board: Board, size_px: tuple[int, int]) -> Detection | str:
     try:
-        result = detect(load(), board)
+        result = detect(_of_size(load(), size_px), board)
     except InputError as error:
         return str(error)
     return result if isinstance(result, Detection) else result.reason
 
 
-def _of_size(recording: Recording, frame: FrameRecord) -> NDArray[Any]:
-    """A frame's picture; `InputError` where it has not the size of the recording's camera.
+def _of_size(image: NDArray[Any], size_px: tuple[int, int]) -> NDArray[Any]:
+    """The picture; `InputError` where it has not the size of the recording's camera.
 
     A picture of another size comes from another camera, another binning or region, or was scaled:
     its pixels are not those of the other pictures.
     """
-    image = recording.image(frame)
-    found, camera = (image.shape[1], image.shape[0]), recording.size_px
-    if found != camera:
+    found = (image.shape[1], image.shape[0])
+    if found != size_px:
         raise InputError(
             f"the picture has {found[0]}x{found[1]} pixels, and the recording's camera"
-            f" {camera[0]}x{camera[1]}: another camera, binning or region, or a scaled picture"
+            f" {size_px[0]}x{size_px[1]}: another camera, binning or region, or a scaled picture"
         )
     return image
 

@@ -39,7 +39,7 @@ from cell.verbs.importing.joints import as_poses, in_order, radians
 from cell.verbs.importing.pairing import apply, pairings
 from cell.verbs.importing.pose_files import flange_series, read_series
 from cell.verbs.importing.raw import Series
-from cell.verbs.importing.sources import picture_size, pictures_in, pose_files_beside
+from cell.verbs.importing.sources import common_size_px, pictures_in, pose_files_beside
 
 _ENOUGH_TO_ASK = 4
 _BOTH_MOUNTS = (
@@ -161,10 +161,12 @@ def _import_pictures(
             " as --board 6x9x0.025"
         )
     series = _series(described)
-    header = _header(source, pictures, described)
+    size_px, sizes = common_size_px(pictures)
+    notes += sizes
+    header = _header(source, size_px, described)
     corners, posed = None, None
     if series:
-        corners = _corners_of(header, pictures, progress)
+        corners = _corners_of(header.board.board(), size_px, pictures, progress)
         posed = _posed(series, pictures, corners, header.board.board(), described)
         header = header.model_copy(update={"imported": _told(header, posed)})
         notes += posed.guessed
@@ -274,9 +276,11 @@ def _joints(names: Sequence[str], described: Described) -> FloatArray:
     return out
 
 
-def _corners_of(header: Header, pictures: Sequence[Path], progress: Progress | None) -> Corners:
+def _corners_of(
+    board: Board, size_px: tuple[int, int], pictures: Sequence[Path], progress: Progress | None
+) -> Corners:
     loads = [(k, partial(read_picture, picture)) for k, picture in enumerate(pictures)]
-    return detect_in_pictures(loads, header.board.board(), progress)
+    return detect_in_pictures(loads, board, size_px, progress)
 
 
 def _check(pictures: int, corners: Corners, board: Board, mount: Mount) -> PictureCheck | None:
@@ -294,8 +298,8 @@ def _check(pictures: int, corners: Corners, board: Board, mount: Mount) -> Pictu
     return closure
 
 
-def _header(source: Path, pictures: Sequence[Path], described: Described) -> Header:
-    height, width = picture_size(pictures)
+def _header(source: Path, size_px: tuple[int, int], described: Described) -> Header:
+    width, height = size_px
     data: dict[str, Any] = {
         "schema": "cell.recording/1",
         "name": described.name or source.resolve().name,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 from cell.errors import InputError
-from cell.storage.incoming import read_picture
+from cell.storage.incoming.pictures import picture_size_px
 from cell.verbs.importing.pose_files import IMAGE_SUFFIXES, visible
 
 _DEPTH = re.compile(r"depth|disparity|(?:^|[_-])(?:ir|infra\w*)(?:[_-]|\d|$)", re.IGNORECASE)
@@ -46,12 +47,29 @@ def pose_files_beside(folder: Path) -> list[str]:
     return [path.name for path in visible(folder) if path.suffix.lower() in _TABLES]
 
 
-def picture_size(pictures: Sequence[Path]) -> tuple[int, int]:
-    """(height, width) of the first picture that is one; raises `InputError` without any."""
-    for picture in pictures:
-        try:
-            image = read_picture(picture)
-        except InputError:
-            continue  # told, with its reason, as a frame without corners
-        return image.shape[0], image.shape[1]
-    raise InputError(f"{pictures[0].parent}: none of the {len(pictures)} pictures is an image")
+def common_size_px(pictures: Sequence[Path]) -> tuple[tuple[int, int], tuple[str, ...]]:
+    """(width, height) of most pictures, and a word about those of another size.
+
+    Raises
+    ------
+    InputError
+        None of them is an image.
+    """
+    sizes = Counter(size for picture in pictures if (size := _size_of(picture)) is not None)
+    if not sizes:
+        raise InputError(f"{pictures[0].parent}: none of the {len(pictures)} pictures is an image")
+    (size, _), *others = sizes.most_common()
+    if not others:
+        return size, ()
+    words = ", ".join(f"{count} of {width}x{height}" for (width, height), count in others)
+    return size, (
+        f"the camera's pictures have {size[0]}x{size[1]} pixels; {words} are left out:"
+        " another camera, binning or region, or scaled pictures",
+    )
+
+
+def _size_of(picture: Path) -> tuple[int, int] | None:
+    try:
+        return picture_size_px(picture)
+    except InputError:
+        return None  # reported, with its reason, as a frame without corners
