@@ -14,6 +14,7 @@ from calib.detection.charuco_fit import FEWEST_CORNERS, Guess, Seen, fit_charuco
 from calib.detection.grid import spread_out, with_predictions
 from calib.detection.lattice import grow_lattices
 from calib.detection.markers import layouts, on_board, place_by_markers
+from calib.detection.other_board import other_board
 from calib.detection.refine import Fitted
 from calib.detection.result import FloatArray, Rejected
 from calib.detection.scales import scaled, scales
@@ -58,18 +59,23 @@ def _expected_corners(
     return float(np.median(np.abs(misfit))), expected.reshape(board.rows, board.cols, 2)
 
 
-def _by_reading(image: NDArray[np.float32], board: Board) -> Guess | Rejected:
-    """Where the markers that can be read say the corners are, seen or not."""
-    drawn = layouts(board)
-    dictionary = drawn[0].getDictionary()
+def _read_markers(image: NDArray[np.float32], board: Board) -> tuple[Any, Any]:
+    """Outlines and numbers of the dictionary's markers that can be read; None where none can."""
+    dictionary = layouts(board)[0].getDictionary()
     settings = cv2.aruco.DetectorParameters()
     # cells of less than two pixels cannot be read, but looking at all such specks takes seconds
     least_side_px = 2 * (dictionary.markerSize + 2)
     settings.minMarkerPerimeterRate = 4 * least_side_px / max(image.shape)
     detector = cv2.aruco.ArucoDetector(dictionary, settings)
     marker_corners, marker_ids, _ = detector.detectMarkers(_eight_bit(image))
+    return marker_corners, marker_ids
+
+
+def _by_reading(marker_corners: Any, marker_ids: Any, board: Board) -> Guess | Rejected:
+    """Where the markers that can be read say the corners are, seen or not."""
     if marker_ids is None or len(marker_ids) < _FEWEST_MARKERS:
         return Rejected("fewer than two of the board's markers were read")
+    drawn = layouts(board)
     found = [_expected_corners(layout, marker_corners, marker_ids, board) for layout in drawn]
     fitting = [entry for entry in found if entry is not None]
     if not fitting:
@@ -90,11 +96,11 @@ def _by_lattice(image: NDArray[np.float32], board: Board) -> Guess | None:
     return None
 
 
-def _guesses(image: NDArray[np.float32], board: Board) -> Iterator[Guess | Rejected]:
+def _guesses(
+    image: NDArray[np.float32], read: Guess | Rejected, board: Board
+) -> Iterator[Guess | Rejected]:
     """Where the corners may be in the full image, one guess after the other."""
-    readable = next(s for s in (1.0, 0.5, 0.25, 0.125) if image.size * s * s <= _READ_PIXELS)
-    read = _by_reading(scaled(image, readable), board)
-    yield read if isinstance(read, Rejected) else read.enlarged(readable)
+    yield read
     for scale in scales(image.shape):
         held = _by_lattice(scaled(image, scale), board)
         if held is not None:
@@ -107,7 +113,8 @@ def find_charuco(
     """Fit all corners of a ChArUco board and say which were not seen, (rows, cols).
 
     The markers are read first; where that does not give most corners, lattices of crossings are
-    held against the markers that should lie between them. The best guess wins.
+    held against the markers that should lie between them. The best guess wins. Markers that cannot
+    be this board's end the search.
 
     Parameters
     ----------
@@ -118,9 +125,16 @@ def find_charuco(
     """
     if not layouts(board):
         return Rejected("a ChArUco board needs the size of its markers and their dictionary")
+    readable = next(s for s in (1.0, 0.5, 0.25, 0.125) if image.size * s * s <= _READ_PIXELS)
+    marker_corners, marker_ids = _read_markers(scaled(image, readable), board)
+    other = other_board(layouts(board), marker_corners, marker_ids, board)
+    if other is not None:
+        return Rejected(other)
+    read = _by_reading(marker_corners, marker_ids, board)
+    read = read if isinstance(read, Rejected) else read.enlarged(readable)
     best: Seen | None = None
     reason: Rejected | None = None
-    for guess in _guesses(image, board):
+    for guess in _guesses(image, read, board):
         seen = guess if isinstance(guess, Rejected) else fit_charuco(image, guess, board)
         if isinstance(seen, Rejected):
             reason = seen if reason is None else reason

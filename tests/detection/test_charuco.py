@@ -1,3 +1,5 @@
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -13,10 +15,11 @@ BOARD = Board("charuco", 6, 4, 0.03, 0.021, "DICT_5X5_100")
 OVERSAMPLING = 6
 
 
-def photographed(blur_px=1.0, *, legacy=False, shift=(0.0, 0.0)):
+def photographed(blur_px=1.0, *, legacy=False, shift=(0.0, 0.0), first=0):
     """The board seen aslant, drawn by OpenCV and scaled down; and its true corners."""
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
-    layout = cv2.aruco.CharucoBoard((5, 7), 0.03, 0.021, dictionary)
+    numbers = np.arange(first, first + 17)
+    layout = cv2.aruco.CharucoBoard((5, 7), 0.03, 0.021, dictionary, numbers)
     layout.setLegacyPattern(legacy)
     per_square = 70 * 4
     flat = layout.generateImage((5 * per_square, 7 * per_square), marginSize=0)
@@ -107,3 +110,27 @@ def test_a_board_described_without_markers_is_rejected():
     rejected = detect(photograph(image), Board("charuco", 6, 4, 0.03))
     assert isinstance(rejected, Rejected)
     assert "dictionary" in rejected.reason
+
+
+@pytest.mark.parametrize(
+    ("described", "message"),
+    [
+        ((4, 4), r"markers 0 to 16 are in sight, and the described board of 5 x 5 squares .* more"),
+        ((6, 3), "has them in other places: it has other numbers of squares"),
+        ((4, 6), "has them in other places: it has other numbers of squares"),
+    ],
+)
+def test_a_board_other_than_described_is_refused_with_what_was_seen(described, message):
+    image, _ = photographed(1.0)
+    rows, cols = described
+    found = detect(photograph(image), Board("charuco", rows, cols, 0.03, 0.021, "DICT_5X5_100"))
+    assert isinstance(found, Rejected)
+    assert re.search(message, found.reason), found.reason
+
+
+def test_a_board_whose_markers_are_numbered_from_another_one_is_refused():
+    image, _ = photographed(1.0, first=30)
+    found = detect(photograph(image), BOARD)
+    assert isinstance(found, Rejected)
+    assert "markers 30 to 46 are in sight" in found.reason
+    assert "has 0 to 16: its first marker is another one" in found.reason
