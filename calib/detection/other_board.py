@@ -63,7 +63,8 @@ def _steps_squares(corners: FloatArray, board: Board) -> FloatArray:
     down = (corners[:, 3] - corners[:, 0] + corners[:, 2] - corners[:, 1]) / (2 * marker)
     squares_from_image = np.linalg.inv(np.stack([along, down], axis=-1))
     middle = corners.mean(axis=1)
-    return np.einsum("iab,ijb->ija", squares_from_image, middle[None] - middle[:, None])
+    steps = np.einsum("iab,ijb->ija", squares_from_image, middle[None] - middle[:, None])
+    return np.asarray(steps, dtype=np.float64)
 
 
 def _nearest(steps: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:

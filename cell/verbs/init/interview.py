@@ -19,7 +19,7 @@ def _always(_given: Given) -> bool:
 
 
 def _real_arm(given: Given) -> bool:
-    return given["robot"] != "sim"
+    return bool(given["robot"] != "sim")
 
 
 def _simulated_arm(given: Given) -> bool:
@@ -27,7 +27,7 @@ def _simulated_arm(given: Given) -> bool:
 
 
 def _real_camera(given: Given) -> bool:
-    return given["camera"] != "sim"
+    return bool(given["camera"] != "sim")
 
 
 def _no_reason(given: Given) -> bool:
