@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -30,7 +31,8 @@ def export(
         typer.Option("--distance", help="Metres; needed where the focal length depends on it."),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write; stdout without.")
+        Path | None,
+        typer.Option("-o", "--output", help="File (with --views folder) to write; stdout without."),
     ] = None,
     solution: Annotated[
         str | None, typer.Option("--solution", help="Which solution; the best one without.")
@@ -44,6 +46,10 @@ def export(
             help="base=NAME, flange=NAME, camera=NAME or board=NAME: what your tool calls it."
         ),
     ] = None,
+    views: Annotated[
+        Path | None,
+        typer.Option(help="With colmap: a recording whose pictures and poses become a model."),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Hand over the calibrated camera, or its place on the robot, in another tool's format."""
@@ -52,6 +58,11 @@ def export(
     from cell.verbs.export import export_calibration, read_calibration
 
     path = calibration_file(calibration)
+    recording = None
+    if views is not None:
+        from cell.storage.recording import read_recording
+
+        recording = read_recording(views)
     source = read_calibration(path)
     try:
         exported = export_calibration(
@@ -61,12 +72,15 @@ def export(
             solution=solution,
             image_size_px=None if image_size is None else _size(image_size),
             frames=dict(_frame(words) for words in frame or ()),
+            views=recording,
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     for warning in exported.warnings:
         say(f"warning: {warning}")
-    if output is not None:
+    if exported.files:
+        _write_folder(output, exported.files)
+    elif output is not None:
         write_whole(output, exported.text)
     if output is None and not as_json:
         sys.stdout.write(exported.text)
@@ -75,6 +89,19 @@ def export(
     written = None if output is None else str(output)
     result = {"format": tool, "file": written, "text": exported.text, "warnings": exported.warnings}
     show(f"{tool}: {output}", result, as_json=as_json)
+
+
+def _write_folder(output: Path | None, files: Mapping[str, str]) -> None:
+    from cell.storage.whole import write_whole
+
+    if output is None:
+        raise InputError("--views makes a folder of files: say which with -o FOLDER")
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise InputError(f"-o {output}: cannot be made: {fault.strerror}; give another") from None
+    for name, text in files.items():
+        write_whole(output / name, text)
 
 
 def _frame(words: str) -> tuple[str, str]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from cell.errors import InputError
 from cell.storage.files.calibration_source import CalibrationSource, SolutionSource
@@ -13,6 +14,9 @@ from cell.verbs.export.formats import colmap, kalibr, mrcal, opencv, ros
 from cell.verbs.export.formats.json_text import json_text
 from cell.views.poses import abb, easy_handeye2, plain_text, tf, ur, urdf
 from cell.views.poses.placement import Placement, placements, refuse_undetermined
+
+if TYPE_CHECKING:
+    from cell.storage.recording import Recording
 
 _SKEW_PX = 1e-9
 
@@ -39,10 +43,19 @@ FORMATS = (*TEXTS, "json", *POSES)
 
 @dataclass(frozen=True)
 class Exported:
-    """The text of the file, and what its reader should know besides."""
+    """What was handed over.
+
+    Attributes
+    ----------
+    text, warnings:
+        The text of the file, and what its reader should know besides.
+    files:
+        Of a model that is a folder, the text of each file by its name; that of `text` among them.
+    """
 
     text: str
     warnings: tuple[str, ...]
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 def export_calibration(
@@ -53,6 +66,7 @@ def export_calibration(
     solution: str | None = None,
     image_size_px: tuple[int, int] | None = None,
     frames: Mapping[str, str] | None = None,
+    views: Recording | None = None,
 ) -> Exported:
     """The calibrated camera in a tool's own format.
 
@@ -70,6 +84,8 @@ def export_calibration(
         (width, height) for a file that does not tell.
     frames:
         Names of `FRAMES` in the reader's tool, for the formats of `POSES`.
+    views:
+        The recording whose pictures become a whole model; `colmap` alone has such.
 
     Raises
     ------
@@ -77,6 +93,8 @@ def export_calibration(
         The format cannot say this camera, or the calibration does not determine it; the
         message tells what to choose.
     """
+    if views is not None and tool != "colmap":
+        raise InputError(f"--views: {tool} holds a camera and no pictures; colmap does")
     if tool in POSES:
         return Exported(POSES[tool](placements(calibration, frames)), ())
     refuse_undetermined(calibration, "camera")
@@ -93,7 +111,12 @@ def export_calibration(
         raise InputError(refusal(calibration, name, tool))
     _refuse_skew(found, name, tool)
     size = calibration.image_size_px or image_size_px
-    return Exported(TEXTS[tool](_camera(calibration, name, size, distance_m)), warnings)
+    camera = _camera(calibration, name, size, distance_m)
+    if views is None:
+        return Exported(TEXTS[tool](camera), warnings)
+    from cell.verbs.export.model import model_texts
+
+    return Exported(TEXTS[tool](camera), warnings, model_texts(calibration, camera, views))
 
 
 def _camera(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from cell.verbs.export.camera import Camera
 
 _MODELS = {4: "OPENCV", 8: "FULL_OPENCV"}
-_CORNER = 0.5
+CORNER = 0.5
 """COLMAP puts (0, 0) at the top-left corner of the top-left pixel, its centre at (0.5, 0.5)."""
 
 
@@ -16,7 +16,7 @@ def text(camera: Camera) -> str:
     """
     d = camera.coefficients(tuple(_MODELS), "colmap")
     width, height = camera.size_px("colmap")
-    centre = (camera.u0_px + _CORNER, camera.v0_px + _CORNER)
+    centre = (camera.u0_px + CORNER, camera.v0_px + CORNER)
     values = (camera.alpha_px, camera.beta_px, *centre, *d)
     return (
         f"# {camera.about}\n"
