@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
-from benchmarks.fuzz.kinds import Kind
+from benchmarks.fuzz.kind import Kind
 from benchmarks.fuzz.mutations import mutated
 
 CPU_S = 5.0

@@ -1,19 +1,20 @@
-"""Every kind of input: valid examples, and the reader that must refuse what is none."""
+"""Every kind of input, those in files here: valid examples, and the reader that refuses others."""
 
 from __future__ import annotations
 
+import io
 import json
-import socket
-import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from benchmarks.fuzz.kind import Kind
+from benchmarks.fuzz.wire import wire
 from cell.errors import CellError
 from cell.sequencer.journal import read_journal, skipped_views
+from cell.storage.files.arm_description import adopt_description
 from cell.storage.files.calibration_source import read_calibration
 from cell.storage.files.cell_file import read_cell
 from cell.storage.files.plan_file import read_plan
@@ -22,34 +23,10 @@ from cell.storage.incoming.pictures import decode_picture
 from cell.storage.recording import read_recording
 from cell.verbs.importing.pose_files import flange_series, read_series
 from cell.verbs.simulate import parse_effect
-from drivers.abb.egm_message import EgmDecoder, NotBelieved
-from drivers.errors import DeviceError, SafetyError
-from drivers.genicam_pixels import decode as decode_pixels
 from drivers.jpeg import jpeg_size
-from drivers.ur.wire import Recipe, receive
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-REFUSED = (CellError, SafetyError, DeviceError)
 POSE = {"p_m": [0.5, 0.1, 0.4], "q_xyzw": [0.0, 1.0, 0.0, 0.0]}
-
-
-@dataclass(frozen=True)
-class Kind:
-    """One kind of input.
-
-    Attributes
-    ----------
-    name, examples, slow:
-        What it is called; valid ones; whether a reader for people's files reads it.
-    read:
-        Reads an input, in a folder of its own; raises what is in `refused` for a bad one.
-    """
-
-    name: str
-    examples: tuple[bytes, ...]
-    read: Callable[[Path, bytes], object]
-    refused: tuple[type[Exception], ...] = REFUSED
-    slow: bool = False
 
 
 def kinds() -> Iterator[Kind]:
@@ -57,7 +34,7 @@ def kinds() -> Iterator[Kind]:
     yield from _files()
     yield from _poses()
     yield from _pictures()
-    yield from _wire()
+    yield from wire()
 
 
 def _in(name: str, read: Callable[[Path], object]) -> Callable[[Path, bytes], object]:
@@ -101,12 +78,28 @@ def _files() -> Iterator[Kind]:
         for event in ({"event": "start", "plan_sha256": "a"}, {"event": "skip", "view": 3})
     )
     yield Kind("journal", (journal,), _in("journal.jsonl", _journal))
+    yield Kind("URDF", (_urdf(),), _in("arm.urdf", _described), slow=True)
     model = {"alpha_px": 900.0, "beta_px": 901.0, "u0_px": 320.0, "v0_px": 240.0}
     found = {"schema": "cell.calibration/1", "image_size_px": [640, 480],
              "solutions": {"zhang_mle": model}, "flange_from_camera": POSE}  # fmt: skip
     yield Kind("calibration.json", (json.dumps(found).encode(),), _in("c.json", read_calibration))
     yield Kind("effect on the command line", (b"focus_breathing:law=inverse_square,k_px_m2=3/4",),
                lambda _, data: parse_effect(data.decode("utf-8", "replace")))  # fmt: skip
+
+
+def _urdf() -> bytes:
+    joints = "".join(
+        f'<joint name="j{n}" type="revolute"><parent link="l{n}"/><child link="l{n + 1}"/>'
+        f'<origin xyz="0.1 0 0.2" rpy="0 {0.7 * (n % 2)} 0"/><axis xyz="0 {n % 2} {1 - n % 2}"/>'
+        '<limit lower="-2.5" upper="2.5" velocity="2" effort="9"/></joint>\n'
+        for n in range(6)
+    )
+    links = "".join(f'<link name="l{n}"/>\n' for n in range(7))
+    return f'<robot name="own">\n{links}{joints}</robot>\n'.encode()
+
+
+def _described(path: Path) -> object:
+    return adopt_description("c.yaml: robot.urdf", path, "l0", "l6")
 
 
 def _plan(path: Path, cell: bytes) -> object:
@@ -155,9 +148,25 @@ def _poses() -> Iterator[Kind]:
         "ls": "P[1]{\n GP1:\n X = 600.0 mm, Y = 1.0 mm, Z = 5.0 mm,\n"
               " W = 1.0 deg, P = 2.0 deg, R = 3.0 deg\n};\n",
         "script": "movel(p[0.1,0.2,0.3,0.1,0.2,0.3], a=1.2)\n" * 3,
+        "log": "At time 1.5\n- Translation: [0.100, 0.200, 0.300]\n"
+               "- Rotation: in Quaternion [0.000, 0.000, 0.000, 1.000]\n" * 3,
+        "xml": cv2_storage(".xml"),
     }  # fmt: skip
     for suffix, text in examples.items():
         yield Kind(f"poses .{suffix}", (text.encode(),), _in(f"p.{suffix}", _series))
+    poses = np.tile(np.eye(4), (4, 1, 1))
+    for suffix, save in (("npy", np.save), ("npz", np.savez)):
+        file = io.BytesIO()
+        save(file, poses)
+        yield Kind(f"poses .{suffix}", (file.getvalue(),), _in(f"p.{suffix}", _series))
+
+
+def cv2_storage(suffix: str) -> str:
+    """Four poses as OpenCV's file storage writes them."""
+    storage = cv2.FileStorage(suffix, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+    for number in range(4):
+        storage.write(f"pose_{number}", np.eye(4))
+    return str(storage.releaseAndGetString())
 
 
 def _series(path: Path) -> object:
@@ -171,40 +180,3 @@ def _pictures() -> Iterator[Kind]:
         yield Kind(f"picture {suffix}", (data,), lambda _, data: decode_picture(data, "a"))
     jpeg = cv2.imencode(".jpg", grey)[1].tobytes()
     yield Kind("Robotiq JPEG's size", (jpeg,), lambda _, data: jpeg_size(data))
-
-
-def _wire() -> Iterator[Kind]:
-    recipe = Recipe(["timestamp", "actual_q", "safety_mode"], ["DOUBLE", "VECTOR6D", "INT32"])
-    package = recipe.pack({"timestamp": 1.0, "actual_q": (0.1,) * 6, "safety_mode": 1})
-    yield Kind("RTDE package", (package,), lambda _, data: recipe.unpack(data),
-               (*REFUSED, struct.error))  # fmt: skip
-    frame = struct.pack(">HB", 3 + len(package), 85) + package
-    yield Kind("RTDE frame", (frame,), lambda _, data: _received(data), (*REFUSED, OSError))
-    decoder = EgmDecoder([(-3.2, 3.2)] * 6)
-    yield Kind("EGM datagram", (_egm(),), lambda _, data: decoder.decode(data), (NotBelieved,))
-    pixels = bytes(range(48)) * 4
-    yield Kind("GenICam buffer", (pixels,),
-               lambda _, data: decode_pixels(data, 8, len(data) // 16, "Mono16"),
-               (*REFUSED, ValueError))  # fmt: skip
-
-
-def _received(data: bytes) -> object:
-    ours, theirs = socket.socketpair()
-    with ours, theirs:
-        ours.settimeout(0.5)
-        theirs.sendall(data[:60_000])
-        theirs.shutdown(socket.SHUT_WR)
-        return receive(ours)
-
-
-def _egm() -> bytes:
-    from ABBRobotEGM._egm_protobuf import egm_pb2
-
-    message = egm_pb2.EgmRobot()
-    message.header.seqno, message.header.tm = 7, 1000
-    message.header.mtype = egm_pb2.EgmHeader.MSGTYPE_DATA
-    message.feedBack.joints.joints.extend([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    place = message.feedBack.cartesian
-    place.pos.x, place.pos.y, place.pos.z = 500.0, 10.0, 600.0
-    place.orient.u0, place.orient.u1, place.orient.u2, place.orient.u3 = 1.0, 0.0, 0.0, 0.0
-    return bytes(message.SerializeToString())

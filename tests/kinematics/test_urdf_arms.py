@@ -160,11 +160,22 @@ def test_parallel_axes_have_no_distance_along_themselves_to_hide_in():
         (urdf(OFFSET_WRIST, limit='upper="1"'), "joint pan: needs limits"),
         (urdf(OFFSET_WRIST).replace('"0.0 0.0 0.265"', '"0 0 x"'), "is not three numbers"),
         (urdf(OFFSET_WRIST).replace("<axis", '<mimic joint="lift"/><axis', 1), "mimics another"),
+        (urdf(OFFSET_WRIST, limit='lower="-inf" upper="1e999"'), "joint pan: needs limits"),
+        (urdf(OFFSET_WRIST).replace('"0.0 0.0 0.265"', '"0 0 1e300"'), "three numbers within"),
+        (urdf(OFFSET_WRIST).replace('<link name="lift_link">', '<link name="x">'), "not there"),
+        (urdf(OFFSET_WRIST).replace('value="2.5"', 'value="heavy"', 1), "no number of kilograms"),
+        (urdf(OFFSET_WRIST).replace('value="2.5"', 'value="1e999"', 1), "no number of kilograms"),
     ],
 )
 def test_what_is_no_arm_is_refused_by_name(text, says):
     with pytest.raises(UnusableUrdf, match=says):
         arm_from_urdf(text, "base_link", "tool0", "made-up")
+
+
+@pytest.mark.parametrize("speed", ["1e999", "nan", "-1", "fast"])
+def test_a_speed_that_no_joint_has_is_not_believed(speed):
+    limit = f'lower="-3" upper="3" velocity="{speed}"'
+    np.testing.assert_allclose(made_up(OFFSET_WRIST, limit=limit).max_speed_rad_s, 1.0)
 
 
 def test_limits_speeds_and_masses_are_the_files():

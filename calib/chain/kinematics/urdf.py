@@ -25,6 +25,8 @@ from calib.views import FloatArray
 JOINTS = 6
 _TURNING, _FIXED = ("revolute", "continuous"), "fixed"
 _FULL_TURN_RAD, _USUAL_SPEED_RAD_S = 2 * np.pi, 1.0
+_LARGEST, _MOST_RAD, _FASTEST_RAD_S, _HEAVIEST_KG = 1e3, 1e2, 1e2, 1e5
+"""No metre, radian, joint limit, joint speed or mass of an arm is larger: a slip, or worse."""
 
 
 class UnusableUrdf(ValueError):
@@ -159,9 +161,19 @@ def _numbers(element: ElementTree.Element, key: str, default: str = "0 0 0") -> 
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.empty(0)
-    if values.shape != (3,) or not np.isfinite(values).all():
-        raise UnusableUrdf(f'{element.tag} {key}="{text}" is not three numbers')
+    if values.shape != (3,) or not (np.abs(values) <= _LARGEST).all():
+        raise UnusableUrdf(
+            f'{element.tag} {key}="{text[:80]}" is not three numbers within {_LARGEST:g}'
+        )
     return values
+
+
+def _number(element: ElementTree.Element | None, key: str) -> float:
+    """A number that may be missing; not a number where it is, or is none."""
+    try:
+        return float((None if element is None else element.get(key)) or "nan")
+    except ValueError:
+        return np.nan
 
 
 def _axis(joint: ElementTree.Element, base_from_child: FloatArray) -> Axis:
@@ -177,23 +189,17 @@ def _limits(joint: ElementTree.Element) -> tuple[float, float]:
     limit = joint.find("limit")
     if joint.get("type") == "continuous":
         return -_FULL_TURN_RAD, _FULL_TURN_RAD
-    low, high = (None if limit is None else limit.get(key) for key in ("lower", "upper"))
-    try:
-        angles = float(low or "nan"), float(high or "nan")
-    except ValueError:
-        angles = np.nan, np.nan
-    if not angles[0] < angles[1]:
-        raise UnusableUrdf(f"joint {joint.get('name')}: needs limits, lower below upper")
-    return angles
+    low, high = _number(limit, "lower"), _number(limit, "upper")
+    if not -_MOST_RAD <= low < high <= _MOST_RAD:
+        raise UnusableUrdf(
+            f"joint {joint.get('name')}: needs limits, lower below upper, within {_MOST_RAD:g} rad"
+        )
+    return low, high
 
 
 def _speed(joint: ElementTree.Element) -> float:
-    limit = joint.find("limit")
-    try:
-        speed = float((None if limit is None else limit.get("velocity")) or "nan")
-    except ValueError:
-        speed = np.nan
-    return speed if speed > 0 else _USUAL_SPEED_RAD_S
+    speed = _number(joint.find("limit"), "velocity")
+    return speed if 0 < speed <= _FASTEST_RAD_S else _USUAL_SPEED_RAD_S
 
 
 def _masses(
@@ -226,7 +232,14 @@ def _inertials(
     at, links = 0, {link.get("name"): link for link in root.findall("link")}
     for joint, pose in zip(path, poses, strict=True):
         at += joint.get("type") in _TURNING
-        inertial = links[_link(joint, "child")].find("inertial")
+        name = _link(joint, "child")
+        link = links.get(name)
+        if link is None:
+            raise UnusableUrdf(f"joint {joint.get('name')} ends at a link {name} that is not there")
+        inertial = link.find("inertial")
         weight = None if inertial is None else inertial.find("mass")
         if inertial is not None and weight is not None:
-            yield at, float(weight.get("value", "0")), (pose @ _origin(inertial))[:3, 3]
+            mass_kg = _number(weight, "value")
+            if not 0.0 <= mass_kg <= _HEAVIEST_KG:
+                raise UnusableUrdf(f"link {name}: its mass is no number of kilograms")
+            yield at, mass_kg, (pose @ _origin(inertial))[:3, 3]
