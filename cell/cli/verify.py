@@ -41,12 +41,13 @@ def verify(
         str | None, typer.Option(help="Its two ends, ROW,COL:ROW,COL, such as 0,0:0,9.")
     ] = None,
     tolerance_mm: Annotated[
-        float,
+        float | None,
         typer.Option(
-            help="Error at the work piece that matters; a check that could overlook more cannot"
-            " tell.",
+            help="Error at the work piece that matters: what changed by less is still good, and a"
+            " check that could overlook more cannot tell. Without it any change counts that is more"
+            " than chance, and the check must be able to notice 1 mm.",
         ),
-    ] = 1.0,
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the results.")
     ] = None,
@@ -57,7 +58,7 @@ def verify(
     from cell.verbs.verify.verb import verify_into
     from cell.views.terminal.progress import counted_progress
 
-    if not tolerance_mm > 0:
+    if tolerance_mm is not None and not tolerance_mm > 0:
         raise InputError(f"--tolerance-mm {tolerance_mm:g}: must be above 0")
     known = _known(length_m, length_sigma_m, corners)
     recording, folder = _recording(source, calibration, dry_run, views, output)
@@ -67,12 +68,12 @@ def verify(
             calibration,
             folder,
             known=known,
-            tolerance_m=1e-3 * tolerance_mm,
+            tolerance_m=None if tolerance_mm is None else 1e-3 * tolerance_mm,
             progress=progress,
         )
     result = found.content.model_dump(mode="json", by_alias=True)
     show(f"{text(found.content)}\nreport: {found.page}", result, as_json=as_json)
-    raise typer.Exit(0 if found.content.verdict == "good" else 1)
+    raise typer.Exit(0 if found.content.verdict in ("good", "within_tolerance") else 1)
 
 
 def _recording(

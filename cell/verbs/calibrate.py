@@ -137,7 +137,7 @@ def calibrate_into(
     folder:
         Where to; `default_folder` where None.
     progress:
-        LayoutDoubt after every picture searched.
+        Called after every picture searched.
     simulated:
         Puts the banner on the report.
 

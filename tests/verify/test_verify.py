@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +30,7 @@ def _checked(
     views: Views,
     mount: Mount = "eye_in_hand",
     known: KnownLength | None = None,
-    tolerance_m: float = 1e-3,
+    tolerance_m: float | None = None,
 ) -> Checked:
     return check(
         old(mount),
@@ -53,9 +54,12 @@ def test_a_camera_that_stayed_is_still_good_and_its_misfit_as_large_as_foretold(
     found = [_found(new_views(seed, mount=mount), mount) for seed in (1, 2, 3)]
     assert [f.verdict for f in found] == ["good"] * 3
     assert not any(f.board and f.board.moved for f in found)
-    ratio = [frame.rms_px / frame.allowed_px for f in found for frame in f.frames]
+    frames = [frame for f in found for frame in f.frames]
+    ratio = [frame.rms_px / frame.sigma_px for frame in frames]
     assert 0.6 < np.sqrt(np.mean(np.square(ratio))) < 1.4
-    assert max(frame.workpiece_m for f in found for frame in f.frames) < 3e-4
+    assert all(frame.limit_px > 1.1 * frame.sigma_px for frame in frames)
+    assert np.mean([frame.rms_px > frame.limit_px for frame in frames]) < 0.05
+    assert max(frame.workpiece_m for frame in frames) < 3e-4
 
 
 @pytest.mark.parametrize("mount", MOUNTS)
@@ -68,7 +72,18 @@ def test_a_knock_of_a_millimetre_is_told_with_its_size(mount: Mount) -> None:
     assert max(found.mount.sigma_shift_m) < 2e-4
     assert found.board is not None
     assert not found.board.moved
-    assert max(f.rms_px / f.allowed_px for f in found.frames) > 2
+    assert max(f.rms_px / f.limit_px for f in found.frames) > 1
+
+
+def test_a_knock_inside_the_tolerance_that_was_given_is_still_good() -> None:
+    knocked = new_views(4, camera=KNOCK)
+    found = _checked(knocked, tolerance_m=2e-3).content
+    assert found.verdict == "within_tolerance"
+    assert re.match(
+        r"Moved (0\.9\d*|1) mm, which makes at most .* your 2 mm: still good", found.sentence
+    )
+    assert text(found).startswith("verdict: still good, inside your tolerance\n")
+    assert _checked(knocked, tolerance_m=8e-4).content.verdict == "moved"
 
 
 def test_a_lens_refocused_by_two_thousandths_is_told_with_its_size() -> None:
@@ -187,7 +202,8 @@ def test_the_file_s_own_words_and_the_page_hold_all_of_it() -> None:
     for words in ("Moved", "hand-eye differs", "SIMULATED", "<svg", "Error of length measurement"):
         assert words in page
     assert said.startswith("verdict: moved")
-    assert "allowed px" in said
+    assert "one sigma px" in said
+    assert "limit px" in said
 
 
 def test_the_views_chosen_know_more_than_as_many_taken_evenly() -> None:

@@ -67,8 +67,10 @@ class FramePart(ResultPart):
     frame: int
     distance_m: PositiveFloat
     rms_px: NotNegative
-    allowed_px: NotNegative
-    """What the uncertainties of calibration, arm and corners would make."""
+    sigma_px: NotNegative
+    """One sigma of it by the uncertainties of calibration, arm and corners."""
+    limit_px: NotNegative
+    """What these uncertainties exceed once in a hundred times."""
     lateral_m: NotNegative
     workpiece_m: NotNegative
     """By which the robot would miss a part of the board's size that this picture locates."""
@@ -81,7 +83,8 @@ class DistancePart(ResultPart):
     far_m: PositiveFloat
     corners: int
     rms_px: NotNegative
-    allowed_px: NotNegative
+    sigma_px: NotNegative
+    limit_px: NotNegative
     worst_px: NotNegative
     worst_at_px: tuple[float, float]
     lateral_m: NotNegative
@@ -94,7 +97,8 @@ class ImagePart(ResultPart):
     to_px: tuple[float, float]
     corners: int
     rms_px: NotNegative
-    allowed_px: NotNegative
+    sigma_px: NotNegative
+    limit_px: NotNegative
     mean_px: tuple[float, float]
     """What points one way is no noise."""
     lateral_m: NotNegative
@@ -129,6 +133,7 @@ class LengthPart(ResultPart):
 
 Verdict = Literal[
     "good",
+    "within_tolerance",
     "moved",
     "lens_changed",
     "moved_and_lens_changed",
@@ -155,7 +160,8 @@ class VerifyFile(ResultPart):
     recording: str
     """Name of the recording it was held against."""
     verdict: Verdict
-    """`changed`: it is not the camera that was calibrated, but these views do not tell what
+    """`within_tolerance`: it changed, by less than the tolerance that was given, and is still good.
+    `changed`: it is not the camera that was calibrated, but these views do not tell what
     changed."""
     sentence: str
     """The verdict in words."""

@@ -68,7 +68,7 @@ def diagnose_into(
     effects:
         Names to take in place of the search.
     progress:
-        LayoutDoubt after every picture searched.
+        Called after every picture searched.
     simulated:
         Puts the banner on the report.
     calibrated:

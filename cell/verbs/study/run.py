@@ -96,9 +96,9 @@ def run_study(
     stop:
         Looked at all the time.
     listener:
-        LayoutDoubt after every file written: tasks tried, and tasks in all.
+        Called after every file written: tasks tried, and tasks in all.
     say:
-        LayoutDoubt what is tried again, and that no worker is left.
+        Called with what is tried again, and that no worker is left.
 
     Raises
     ------

@@ -36,6 +36,8 @@ from cell.verbs.verify.old_cell import OldCell
 
 IntArray = NDArray[np.int64]
 _ARM_ALARM = 1e-3
+USUAL_TOLERANCE_M = 1e-3
+CHANGED = ("moved", "lens_changed", "moved_and_lens_changed", "changed")
 _NOISIER = 1.5
 _ALPHA_DISTANCES = 3
 
@@ -64,7 +66,7 @@ def check(
     calibration: str,
     recording: str,
     known: KnownLength | None,
-    tolerance_m: float,
+    tolerance_m: float | None,
     left_out: dict[int, str],
 ) -> Checked:
     """Hold a recording's views against an old calibration.
@@ -76,7 +78,9 @@ def check(
     known:
         A length measured by other means.
     tolerance_m:
-        The check must be able to notice a change that makes this error at the work piece.
+        Error at the work piece that matters: a smaller change is no reason to calibrate anew, and
+        the check must be able to notice a larger one. Where None, any change is one, and the check
+        must notice one of `USUAL_TOLERANCE_M`.
     left_out:
         Frames without corners, and why.
 
@@ -93,7 +97,10 @@ def check(
     misfit = misfit_of(old, found)
     length = None if known is None else measure(old, found, misfit, known)
     notice = noticeable(old, found, misfit)
-    verdict = _verdict(found, length, notice, tolerance_m)
+    verdict = _verdict(found, length, notice, tolerance_m or USUAL_TOLERANCE_M)
+    if tolerance_m is not None and verdict in CHANGED and notice.workpiece_m < tolerance_m:
+        inside = misfit.workpiece_m.max() < tolerance_m and not (length and length.wrong)
+        verdict = "within_tolerance" if inside else verdict
     used = [int(frame) for frame in found.views.frame]
     content = VerifyFile(
         schema=SCHEMA,
@@ -116,7 +123,7 @@ def check(
         frames=_frames(found, misfit),
         distances=tuple(_distance(p) for p in by_distance(misfit, found.views)),
         image=tuple(_image(p) for p in over_image(misfit, found.views)),
-        noticeable=NoticeablePart(**vars(notice), tolerance_m=tolerance_m),
+        noticeable=NoticeablePart(**vars(notice), tolerance_m=tolerance_m or USUAL_TOLERANCE_M),
         length=None if length is None else _length(length),
         notes=_notes(old, found, length),
     )
@@ -235,9 +242,14 @@ def _gradient(old: OldCell, at: IntArray, distance_m: float) -> FloatArray:
 
 def _frames(found: Judgement, misfit: Misfit) -> tuple[FramePart, ...]:
     rms = np.sqrt(np.nanmean((misfit.residual_px**2).sum(axis=2), axis=1))
-    allowed = np.sqrt(np.nanmean((misfit.allowed_px**2).sum(axis=2), axis=1))
-    columns = (rms, allowed, misfit.distance_m, misfit.lateral_m, misfit.workpiece_m)
-    names = ("rms_px", "allowed_px", "distance_m", "lateral_m", "workpiece_m")
+    columns = (
+        rms,
+        *misfit.expected_each(),
+        misfit.distance_m,
+        misfit.lateral_m,
+        misfit.workpiece_m,
+    )
+    names = ("rms_px", "sigma_px", "limit_px", "distance_m", "lateral_m", "workpiece_m")
     return tuple(
         FramePart(frame=int(frame), **{n: float(c[k]) for n, c in zip(names, columns, strict=True)})
         for k, frame in enumerate(found.views.frame)
@@ -245,13 +257,13 @@ def _frames(found: Judgement, misfit: Misfit) -> tuple[FramePart, ...]:
 
 
 def _distance(place: Place) -> DistancePart:
-    kept = ("corners", "rms_px", "allowed_px", "worst_px", "worst_at_px", "lateral_m")
+    kept = ("corners", "rms_px", "sigma_px", "limit_px", "worst_px", "worst_at_px", "lateral_m")
     values = {name: getattr(place, name) for name in kept}
     return DistancePart(near_m=place.low[0], far_m=place.high[0], **values)
 
 
 def _image(place: Place) -> ImagePart:
-    kept = ("corners", "rms_px", "allowed_px", "mean_px", "lateral_m")
+    kept = ("corners", "rms_px", "sigma_px", "limit_px", "mean_px", "lateral_m")
     values = {name: getattr(place, name) for name in kept}
     (left, top), (right, bottom) = place.low, place.high
     return ImagePart(from_px=(left, top), to_px=(right, bottom), **values)

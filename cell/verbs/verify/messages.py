@@ -9,6 +9,7 @@ from cell.views.terminal.columns import aligned
 
 HEADS = {
     "good": "Still good",
+    "within_tolerance": "Still good, inside your tolerance",
     "moved": "Moved",
     "lens_changed": "Lens changed",
     "moved_and_lens_changed": "Moved, and the lens changed",
@@ -16,9 +17,13 @@ HEADS = {
     "length_wrong": "Known length measured wrong",
     "cannot_tell": "Cannot tell",
 }
-FRAME_HEAD = ("frame", "distance m", "misfit px", "allowed px", "across mm", "work piece mm")
-DISTANCE_HEAD = ("distance m", "corners", "misfit px", "allowed px", "worst px", "at u, v", "mm")
-IMAGE_HEAD = ("part of the image", "corners", "misfit px", "allowed px", "mean u, v px", "mm")
+FRAME_HEAD = ("frame", "distance m", "misfit px", "one sigma px", "limit px", "across mm",
+              "work piece mm")  # fmt: skip
+DISTANCE_HEAD = ("distance m", "corners", "misfit px", "one sigma px", "limit px", "worst px",
+                 "at u, v", "mm")  # fmt: skip
+IMAGE_HEAD = ("part of the image", "corners", "misfit px", "one sigma px", "limit px",
+              "mean u, v px", "mm")  # fmt: skip
+_LENGTH_SAID = ("good", "within_tolerance", "length_wrong")
 _THIRDS = (("top left", "top", "top right"), ("left", "middle", "right"),
            ("bottom left", "bottom", "bottom right"))  # fmt: skip
 
@@ -28,6 +33,8 @@ def sentence_of(found: VerifyFile) -> str:
     match found.verdict:
         case "good":
             return f"The camera is as it was calibrated{_noticed(found)}.{_length(found)}"
+        case "within_tolerance":
+            return _inside(found)
         case "moved":
             return f"The camera moved on its mount: {_shift(found.mount)}. Its lens is as it was."
         case "lens_changed":
@@ -50,6 +57,23 @@ def sentence_of(found: VerifyFile) -> str:
             )
         case _:
             return _cannot_tell(found)
+
+
+def _inside(found: VerifyFile) -> str:
+    """What changed, what it makes at the work piece, and that it is inside the tolerance."""
+    assert found.noticeable is not None
+    worst = max(frame.workpiece_m for frame in found.frames)
+    changes = []
+    if found.mount is not None:
+        changes.append(f"moved {1e3 * np.linalg.norm(found.mount.shift_m):.2g} mm")
+    if found.alpha:
+        middle = found.alpha[len(found.alpha) // 2]
+        changes.append(f"alpha changed by {1e2 * middle.change_px / middle.alpha_px:+.2g} %")
+    what = " and ".join(changes) or "changed"
+    return (
+        f"{what[0].upper()}{what[1:]}, which makes at most {1e3 * worst:.2g} mm at the work piece,"
+        f" inside your {1e3 * found.noticeable.tolerance_m:g} mm: still good.{_length(found)}"
+    )
 
 
 def _noticed(found: VerifyFile) -> str:
@@ -125,11 +149,12 @@ def frame_rows(found: VerifyFile) -> list[tuple[str, ...]]:
             str(f.frame),
             f"{f.distance_m:.3f}",
             f"{f.rms_px:.3f}",
-            f"{f.allowed_px:.3f}",
+            f"{f.sigma_px:.3f}",
+            f"{f.limit_px:.3f}",
             f"{1e3 * f.lateral_m:.3f}",
             f"{1e3 * f.workpiece_m:.3f}",
         )
-        for f in sorted(found.frames, key=lambda f: -f.rms_px / f.allowed_px)
+        for f in sorted(found.frames, key=lambda f: -f.rms_px / f.limit_px)
     ]
 
 
@@ -140,7 +165,8 @@ def distance_rows(found: VerifyFile) -> list[tuple[str, ...]]:
             f"{p.near_m:.3f} – {p.far_m:.3f}",
             str(p.corners),
             f"{p.rms_px:.3f}",
-            f"{p.allowed_px:.3f}",
+            f"{p.sigma_px:.3f}",
+            f"{p.limit_px:.3f}",
             f"{p.worst_px:.3f}",
             f"{p.worst_at_px[0]:.0f}, {p.worst_at_px[1]:.0f}",
             f"{1e3 * p.lateral_m:.3f}",
@@ -156,7 +182,8 @@ def image_rows(found: VerifyFile) -> list[tuple[str, ...]]:
             _part(p.from_px, p.to_px),
             str(p.corners),
             f"{p.rms_px:.3f}",
-            f"{p.allowed_px:.3f}",
+            f"{p.sigma_px:.3f}",
+            f"{p.limit_px:.3f}",
             f"{p.mean_px[0]:+.3f}, {p.mean_px[1]:+.3f}",
             f"{1e3 * p.lateral_m:.3f}",
         )
@@ -183,9 +210,10 @@ def text(found: VerifyFile) -> str:
         lines += [
             "",
             "misfit: seen less predicted by the old calibration, the board where it fits best;",
-            "allowed: what calibration, arm and corners may be off; mm: across the axis.",
+            "one sigma: by the uncertainties of calibration, arm and corners; limit: what they"
+            " exceed once in a hundred times; mm: across the axis.",
         ]
-    if found.length is not None and found.verdict not in ("good", "length_wrong"):
+    if found.length is not None and found.verdict not in _LENGTH_SAID:
         lines.append(length_words(found.length))
     lines += [f"frame {f.frame} left out: {f.reason}" for f in found.frames_left_out]
     lines += [f"note: {note}" for note in found.notes]

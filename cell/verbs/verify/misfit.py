@@ -1,4 +1,4 @@
-"""How far the old calibration's predictions miss the new corners, where, and what is allowed."""
+"""How far the old calibration's predictions miss the new corners, where, and what is expected."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 from calib.chain.model import CellModel, evaluate, predict
 from calib.chain.optics import COLUMN
 from calib.chain.rigid import inverse
+from calib.distributions import chi2_limit
 from calib.solver.free_poses import fit_free_poses
 from calib.solver.joint import fit_joint
 from calib.solver.noise import Noise
 from calib.solver.unknowns import moved, unknowns_of
-from calib.views import FloatArray, Views
-from cell.verbs.verify.judge import Judgement
+from calib.views import BoolArray, FloatArray, Views
+from cell.verbs.verify.judge import SIGNIFICANT, Judgement
 from cell.verbs.verify.old_cell import OldCell
 from cell.views.report.geometry import workpiece_error_m
 
@@ -36,8 +37,10 @@ class Misfit:
         The old cell with the board where it is now.
     residual_px:
         (N, M, 2) seen minus predicted; NaN where not seen.
-    allowed_px:
-        (N, M, 2) one sigma of it by all uncertainties together.
+    spread_px:
+        (N, M, 2, K) what one sigma of each of K independent errors of calibration and arm makes.
+    corner_px:
+        One sigma of a corner.
     distance_m:
         (N,) of the board's centre.
     lateral_m:
@@ -49,10 +52,42 @@ class Misfit:
 
     model: CellModel
     residual_px: FloatArray
-    allowed_px: FloatArray
+    spread_px: FloatArray
+    corner_px: float
     distance_m: FloatArray
     lateral_m: FloatArray
     workpiece_m: FloatArray
+
+    def expected_px(self, mask: BoolArray) -> tuple[float, float]:
+        """One sigma of the RMS misfit of some corners, and what chance exceeds once in a hundred.
+
+        The errors that corners share make the RMS of many scatter as that of a few would: so many
+        degrees of freedom has the chi square of the same mean and variance (Satterthwaite 1946).
+
+        Parameters
+        ----------
+        mask:
+            (N, M) the corners.
+        """
+        rows = self.spread_px[mask].reshape(-1, self.spread_px.shape[-1])
+        gram, corner = rows.T @ rows, self.corner_px**2
+        total = float(np.trace(gram)) + len(rows) * corner
+        square = float((gram**2).sum() + 2 * corner * np.trace(gram) + len(rows) * corner**2)
+        freedom = total**2 / square
+        sigma = float(np.sqrt(2 * total / len(rows)))
+        return sigma, sigma * float(np.sqrt(chi2_limit(SIGNIFICANT, freedom) / freedom))
+
+    @property
+    def seen(self) -> BoolArray:
+        """(N, M) the corners that count."""
+        return np.asarray(np.isfinite(self.residual_px).all(axis=2))
+
+    def expected_each(self) -> tuple[FloatArray, FloatArray]:
+        """(N,) one sigma and limit of each frame's RMS misfit."""
+        frames = np.arange(len(self.residual_px))
+        pairs = [self.expected_px(self.seen & (frames == k)[:, None]) for k in frames]
+        sigma, limit = np.array(pairs).T
+        return sigma, limit
 
 
 @dataclass(frozen=True)
@@ -63,8 +98,9 @@ class Place:
     ----------
     low, high:
         Of the distances, metres, or the place's corners in the image, pixels.
-    rms_px, allowed_px:
-        Length of the misfit there, and what all uncertainties would make.
+    rms_px, sigma_px, limit_px:
+        Length of the misfit there; one sigma of it by all uncertainties; what chance exceeds once
+        in a hundred times.
     mean_px:
         Its mean: what points one way is no noise.
     worst_px, worst_at_px:
@@ -77,7 +113,8 @@ class Place:
     high: tuple[float, ...]
     corners: int
     rms_px: float
-    allowed_px: float
+    sigma_px: float
+    limit_px: float
     mean_px: tuple[float, float]
     worst_px: float
     worst_at_px: tuple[float, float]
@@ -99,7 +136,8 @@ def misfit_of(old: OldCell, found: Judgement) -> Misfit:
     return Misfit(
         model=fit.model,
         residual_px=residual,
-        allowed_px=_allowed(old, fit.model, found),
+        spread_px=_spread(old, fit.model, found),
+        corner_px=found.noise.corner_px,
         distance_m=state.distance_m,
         lateral_m=state.distance_m / scale * _rms_each(residual),
         workpiece_m=workpiece_error_m(
@@ -116,8 +154,8 @@ def _rms_each(residual_px: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.nanmean((residual_px**2).sum(axis=2), axis=1)))
 
 
-def _allowed(old: OldCell, model: CellModel, found: Judgement) -> FloatArray:
-    """(N, M, 2) one sigma by old numbers, arm and corners, less what the board's place takes."""
+def _spread(old: OldCell, model: CellModel, found: Judgement) -> FloatArray:
+    """(N, M, 2, K) one sigma of each error of old numbers and arm, less what the board takes up."""
     views, noise = found.views, found.noise
     seen = found.weight > 0
     columns = [_response(old, model, root, views) for root in camera_roots(old)]
@@ -127,10 +165,9 @@ def _allowed(old: OldCell, model: CellModel, found: Judgement) -> FloatArray:
     spread = np.stack([c[seen].ravel() for c in columns], axis=1)
     J = np.stack([c[seen].ravel() for c in by_board], axis=1)
     spread = spread - J @ np.linalg.lstsq(J, spread, rcond=None)[0]
-    allowed = np.full(views.corners_px.shape, np.nan)
-    variance = (spread**2).sum(axis=1) + noise.corner_px**2
-    allowed[seen] = np.sqrt(variance).reshape(-1, 2)
-    return allowed
+    out = np.zeros((*views.corners_px.shape, len(columns)))
+    out[seen] = spread.reshape(-1, 2, len(columns))
+    return out
 
 
 def _response(old: OldCell, model: CellModel, step: FloatArray, views: Views) -> FloatArray:
@@ -171,7 +208,7 @@ def by_distance(found: Misfit, views: Views) -> list[Place]:
     places = []
     for k in np.unique(which):
         taken = which == k
-        mask = np.isfinite(found.residual_px).all(axis=2) & taken[:, None]
+        mask = found.seen & taken[:, None]
         span = found.distance_m[taken]
         places.append(_place(found, views, mask, (float(span.min()),), (float(span.max()),)))
     return places
@@ -180,7 +217,7 @@ def by_distance(found: Misfit, views: Views) -> list[Place]:
 def over_image(found: Misfit, views: Views) -> list[Place]:
     """The misfit in each ninth of the image that corners were seen in, row by row."""
     u, v = np.moveaxis(np.nan_to_num(views.corners_px), 2, 0)
-    seen = np.isfinite(found.residual_px).all(axis=2)
+    seen = found.seen
     places = []
     for row in range(_THIRDS):
         for column in range(_THIRDS):
@@ -195,7 +232,7 @@ def over_image(found: Misfit, views: Views) -> list[Place]:
 def _place(
     found: Misfit,
     views: Views,
-    mask: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+    mask: BoolArray,
     low: tuple[float, ...],
     high: tuple[float, ...],
 ) -> Place:
@@ -205,12 +242,14 @@ def _place(
     per_px = (found.lateral_m / _rms_each(found.residual_px))[np.nonzero(mask)[0]]
     u, v = views.corners_px[mask][worst]
     mean = off.mean(axis=0)
+    sigma, limit = found.expected_px(mask)
     return Place(
         low=low,
         high=high,
         corners=len(off),
         rms_px=float(np.sqrt((length**2).mean())),
-        allowed_px=float(np.sqrt((found.allowed_px[mask] ** 2).sum(axis=1).mean())),
+        sigma_px=sigma,
+        limit_px=limit,
         mean_px=(float(mean[0]), float(mean[1])),
         worst_px=float(length[worst]),
         worst_at_px=(float(u), float(v)),

@@ -25,7 +25,7 @@ from cell.views.report.plot import Figure, panels
 from cell.views.report.plot.colours import colours
 from cell.views.report.sections.drawing import drawing
 
-_STYLE = {"good": "good", "cannot_tell": "note-worthy"}
+_STYLE = {"good": "good", "within_tolerance": "good", "cannot_tell": "note-worthy"}
 
 
 def render(checked: Checked, *, simulated: bool) -> str:
@@ -107,8 +107,9 @@ def _where(checked: Checked) -> str:
     picture = drawing(
         lambda: draw(judgement, misfit),
         "Seen less predicted by the old calibration, the board where it fits best. Left: over the "
-        "image, arrows to a scale of their own. Right: each frame by its distance, and what the "
-        "uncertainties of calibration, arm and corners allow.",
+        "image, arrows to a scale of their own. Right: each frame by its distance, with one sigma "
+        "by the uncertainties of calibration, arm and corners, and what they exceed once in a "
+        "hundred times.",
         "",
     )
     return html.section(
@@ -139,12 +140,13 @@ def draw(judgement: Judgement, misfit: Misfit) -> Figure:
     image.set(xlim=(0, views.width_px), ylim=(views.height_px, 0), aspect="box")
     image.set(xlabel="u (px)", ylabel="v (px)")
     rms = np.sqrt(np.nanmean((off**2).sum(axis=2), axis=1))
-    allowed = np.sqrt(np.nanmean((misfit.allowed_px**2).sum(axis=2), axis=1))
+    sigma, limit = misfit.expected_each()
     look = {"linestyle": "", "color": BLACK}
     distance.plot(misfit.distance_m, rms, marker="o", label="misfit", **look)
-    distance.plot(misfit.distance_m, allowed, marker="_", markersize=14.0,
-                  label="allowed, one sigma", **look)  # fmt: skip
-    top = 1.3 * float(np.nanmax([rms, allowed]))
+    distance.plot(misfit.distance_m, sigma, marker="_", markersize=8.0, label="one sigma", **look)
+    distance.plot(misfit.distance_m, limit, marker="_", markersize=14.0,
+                  label="limit: one in a hundred beyond", **look)  # fmt: skip
+    top = 1.4 * float(np.nanmax([rms, limit]))
     distance.set(xlabel="distance (m)", ylabel="RMS (px)", ylim=(0, top))
     distance.legend_at = "upper left"
     return figure

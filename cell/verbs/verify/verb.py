@@ -48,7 +48,7 @@ def verify_into(
     folder: Path,
     *,
     known: KnownLength | None = None,
-    tolerance_m: float,
+    tolerance_m: float | None = None,
     progress: Progress | None = None,
 ) -> Verified:
     """Check a calibration with a recording; writes `verify.json` and `verify.html`.
@@ -62,9 +62,9 @@ def verify_into(
     known:
         A length measured by other means.
     tolerance_m:
-        The check must be able to notice a change that makes this error at the work piece.
+        Error at the work piece that matters; see `check`.
     progress:
-        LayoutDoubt after every picture searched.
+        Called after every picture searched.
 
     Raises
     ------

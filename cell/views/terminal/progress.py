@@ -63,7 +63,7 @@ def _clock(seconds: float | None) -> str:
 
 @contextmanager
 def counted_progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """LayoutDoubt (done, total) of what is being done; silent where nobody looks."""
+    """Report (done, total) of what is being done; silent where nobody looks."""
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None)
