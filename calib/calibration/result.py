@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +13,14 @@ from calib.calibration.cross_validation import CrossValidation
 from calib.calibration.identifiability import Weakness
 from calib.calibration.uncertainty import UncertaintyMap
 from calib.handeye import HandEye, chain
+from calib.notebook import Row, Shown, axes_of
 from calib.paper.focus_law import FocusLaw, FocusLawChoice, Parameter
 from calib.paper.scale_factors import ScaleFactor
 from calib.paper.zones import Zones
 from calib.views import BoolArray, FloatArray, Mount
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 VALUES = ("alpha_px", "beta_px", "u0_px", "v0_px", "skew_px", "k1", "k2")
 """The numbers every solution has, in the order of the paper's Table 2."""
@@ -176,8 +181,8 @@ class PositionError:
     hand_eye: HandEye | None
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, repr=False)
+class Calibration(Shown):
     """Everything a calibration found.
 
     Attributes
@@ -228,3 +233,63 @@ class Calibration:
     uncertainty: UncertaintyMap | None = None
     cross_validation: CrossValidation | None = None
     cautions: tuple[Caution, ...] = ()
+
+    @property
+    def best(self) -> str:
+        """Name of the solution to use: that with the robot, where there is one."""
+        return next(n for n in ("joint_ml", "zhang_mle", *self.solutions) if n in self.solutions)
+
+    def headline(self) -> tuple[str, ...]:
+        """What matters, a line each."""
+        near, far = self.distance_range_m
+        name = self.best
+        best = self.solutions[name]
+        alpha, sigma = best.values["alpha_px"], best.sigma.get("alpha_px", np.nan)
+        law = "" if best.focus is None else f", focus law {best.focus.law}"
+        at = "" if best.at_distance_m is None else f" at {best.at_distance_m:.2f} m"
+        against = self.position_error.get(name)
+        robot = (
+            ""
+            if against is None
+            else f"; cameras against the robot {1e3 * Statistics.of(against.common).rms:.2f} mm rms"
+        )
+        return (
+            f"Calibration: {int(self.used.sum())} of {len(self.frame)} frames, {near:.2f} to"
+            f" {far:.2f} m",
+            f"{name}: alpha {alpha:.2f} ± {sigma:.2g} px{at}{law}",
+            f"reprojection {best.reprojection_px['rms']:.3f} px rms{robot}",
+            *(f"warning: {caution.what}" for caution in self.cautions),
+        )
+
+    def rows(self) -> list[Row]:
+        """One row for each solution: its numbers, their sigma, its errors."""
+        rows: list[Row] = []
+        for name, solution in self.solutions.items():
+            against = self.position_error.get(name)
+            rows.append(
+                {"solution": name}
+                | {key: solution.values.get(key) for key in VALUES}
+                | {f"sigma_{key}": solution.sigma.get(key) for key in VALUES}
+                | {
+                    "reprojection_rms_px": solution.reprojection_px["rms"],
+                    "camera_rms_m": None if against is None else Statistics.of(against.common).rms,
+                }
+            )
+        return rows
+
+    def plot(self) -> Figure:
+        """Residuals of the best solution, and their RMS in each frame over distance."""
+        solution = self.solutions[self.best]
+        figure, (image, distance) = axes_of(2)
+        off = np.linalg.norm(solution.residual_px, axis=2)
+        seen = np.isfinite(off)
+        where = solution.residual_px[seen]
+        image.scatter(where[:, 0], where[:, 1], s=2)
+        image.set(xlabel="residual along u (px)", ylabel="along v (px)", aspect="equal")
+        used = seen.any(axis=1)
+        rms = np.sqrt(np.nanmean(off[used] ** 2, axis=1))
+        far = np.linalg.norm(solution.camera_from_board[used, :3, 3], axis=1)
+        distance.plot(far, rms, "o")
+        distance.set(xlabel="distance of the board's origin (m)", ylabel="RMS of a frame (px)")
+        figure.suptitle(f"{self.best}: seen minus predicted")
+        return figure

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from calib.calibration.result import Rejection
 from calib.discovery.prove import Proof
 from calib.discovery.split import Split
+from calib.notebook import Row, Shown, axes_of
 from calib.solver.joint import JointFit
 from calib.views import Views
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Verdict = Literal["consistent", "explained", "unexplained"]
 
@@ -94,8 +98,8 @@ class Unexplained:
     law: FoundLaw | None
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Shown):
     """The whole answer.
 
     Attributes
@@ -130,3 +134,53 @@ class Diagnosis:
     def unexplained(self) -> Unexplained | None:
         """The first of the terms without a name: what was missed most."""
         return self.unexplained_all[0] if self.unexplained_all else None
+
+    def headline(self) -> tuple[str, ...]:
+        """What matters, a line each."""
+        lines = [f"Diagnosis: {self.verdict}"]
+        if self.proof is not None:
+            before, after = self.proof.rms_px_before, self.proof.rms_px_after
+            lines.append(
+                f"{len(self.proof.frames)} frames held out: {before:.3f} px before, {after:.3f} px"
+                f" after; noise {self.proof.noise_px:.3f} px"
+            )
+        lines += [f"{effect.name}: {effect.physics}" for effect in self.effects]
+        lines += [
+            f"unexplained: {term.link}, along {term.covariate} ({term.where})"
+            for term in self.unexplained_all
+        ]
+        lines += [f"cannot be told apart: {' and '.join(a.names)}" for a in self.ambiguous_with]
+        return tuple(lines)
+
+    def rows(self) -> list[Row]:
+        """One row for each number of each effect."""
+        return [
+            {
+                "effect": effect.name,
+                "link": effect.link,
+                "law": effect.law,
+                "parameter": name,
+                "value": number.value,
+                "sigma": number.sigma,
+                "unit": number.unit,
+                "p_value": effect.p_value,
+                "holdout_gain_px": effect.holdout_gain_px,
+            }
+            for effect in self.effects
+            for name, number in effect.parameters.items()
+        ]
+
+    def plot(self) -> Figure:
+        """Where the plain cell's misfit lives, and how held-out frames are predicted."""
+        figure, (where, proof) = axes_of(2)
+        largest = self.mismatch[:8][::-1]
+        names = [f"{m.link}: {m.covariate}" for m in largest]
+        where.barh(range(len(names)), [m.share_of_excess for m in largest], tick_label=names)
+        where.set(xlabel="share of the misfit beyond noise")
+        if self.proof is not None:
+            sizes = (self.proof.rms_px_before, self.proof.rms_px_after, self.proof.noise_px)
+            proof.bar(range(3), sizes, tick_label=["before", "after", "noise"])
+            proof.set(ylabel="frames held out, RMS (px)")
+        figure.suptitle(f"verdict: {self.verdict}")
+        figure.tight_layout()
+        return figure

@@ -27,7 +27,10 @@ def test_the_page_prints_what_it_shows(tmp_path: Path, monkeypatch: pytest.Monke
         elif block.language == "text":
             assert_same(printed, block.code)
             compared += 1
-    assert compared == 7
+    assert compared == 8
+    assert len(repr(names["found"])) < 500
+    assert "<table>" in names["found"]._repr_html_()
+    assert names["diagnosis"].plot().axes
 
 
 def test_every_name_of_the_api_is_there_and_documented() -> None:
