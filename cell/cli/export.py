@@ -50,6 +50,14 @@ def export(
         Path | None,
         typer.Option(help="With colmap: a recording whose pictures and poses become a model."),
     ] = None,
+    refit: Annotated[
+        bool,
+        typer.Option(
+            "--refit",
+            help="Where the format has too few coefficients: its best fit over the picture, with"
+            " how far it is off.",
+        ),
+    ] = False,
     as_json: JsonFlag = False,
 ) -> None:
     """Hand over the calibrated camera, or its place on the robot, in another tool's format."""
@@ -73,6 +81,7 @@ def export(
             image_size_px=None if image_size is None else _size(image_size),
             frames=dict(_frame(words) for words in frame or ()),
             views=recording,
+            refit=refit,
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None

@@ -55,6 +55,10 @@ class Camera:
             )
         return self.image_size_px
 
+    def enough(self, lengths: Sequence[int]) -> int | None:
+        """The shortest of these lengths that leaves out no coefficient, or None."""
+        return next((n for n in lengths if not any(self.distortion[n:])), None)
+
     def coefficients(self, lengths: Sequence[int], tool: str) -> tuple[float, ...]:
         """As many distortion coefficients as `tool` takes, of the lengths it takes.
 
@@ -63,11 +67,12 @@ class Camera:
         InputError
             One that is not zero would be left out.
         """
-        for length in lengths:
-            if not any(self.distortion[length:]):
-                return self.distortion[:length]
+        length = self.enough(lengths)
+        if length is not None:
+            return self.distortion[:length]
         left = [n for n, v in zip(DISTORTION, self.distortion, strict=True) if v][-1]
         raise InputError(
             f"{tool} cannot say the distortion coefficient {left}: it takes"
-            f" {', '.join(DISTORTION[: max(lengths)])}. Export to another format, such as opencv"
+            f" {', '.join(DISTORTION[: max(lengths)])}. Export to another format, such as opencv,"
+            " or take the best fit with those: --refit"
         )

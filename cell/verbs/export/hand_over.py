@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from cell.errors import InputError
 from cell.storage.files.calibration_source import CalibrationSource, SolutionSource
 from cell.verbs.export.camera import Camera
+from cell.verbs.export.domain import domain_of
 from cell.verbs.export.focal_length import focal_lengths_px, moving_law, refusal
 from cell.verbs.export.formats import colmap, kalibr, mrcal, opencv, ros
 from cell.verbs.export.formats.json_text import json_text
@@ -27,6 +28,14 @@ TEXTS: dict[str, Callable[[Camera], str]] = {
     "kalibr": kalibr.text,
     "colmap": colmap.text,
 }
+LENGTHS: dict[str, tuple[int, ...]] = {
+    "ros": ros.LENGTHS,
+    "opencv": opencv.LENGTHS,
+    "mrcal": mrcal.LENGTHS,
+    "kalibr": kalibr.LENGTHS,
+    "colmap": colmap.LENGTHS,
+}
+"""How many coefficients of `DISTORTION` each of them takes."""
 POSES: dict[str, Callable[[Sequence[Placement]], str]] = {
     "tf": tf.text,
     "moveit": tf.launch_file,
@@ -67,6 +76,7 @@ def export_calibration(
     image_size_px: tuple[int, int] | None = None,
     frames: Mapping[str, str] | None = None,
     views: Recording | None = None,
+    refit: bool = False,
 ) -> Exported:
     """The calibrated camera in a tool's own format.
 
@@ -86,6 +96,8 @@ def export_calibration(
         Names of `FRAMES` in the reader's tool, for the formats of `POSES`.
     views:
         The recording whose pictures become a whole model; `colmap` alone has such.
+    refit:
+        Take the tool's model that fits best where it cannot say the camera exactly.
 
     Raises
     ------
@@ -95,6 +107,8 @@ def export_calibration(
     """
     if views is not None and tool != "colmap":
         raise InputError(f"--views: {tool} holds a camera and no pictures; colmap does")
+    if refit and tool not in TEXTS:
+        raise InputError(f"--refit: {tool} loses nothing; it is for {', '.join(TEXTS)}")
     if tool in POSES:
         return Exported(POSES[tool](placements(calibration, frames)), ())
     refuse_undetermined(calibration, "camera")
@@ -111,12 +125,31 @@ def export_calibration(
         raise InputError(refusal(calibration, name, tool))
     _refuse_skew(found, name, tool)
     size = calibration.image_size_px or image_size_px
-    camera = _camera(calibration, name, size, distance_m)
+    camera, more = _sayable(_camera(calibration, name, size, distance_m), tool, refit=refit)
+    warnings += more
     if views is None:
         return Exported(TEXTS[tool](camera), warnings)
     from cell.verbs.export.model import model_texts
 
     return Exported(TEXTS[tool](camera), warnings, model_texts(calibration, camera, views))
+
+
+def _sayable(camera: Camera, tool: str, *, refit: bool) -> tuple[Camera, tuple[str, ...]]:
+    """The camera, refitted where that is asked for and needed, with what its reader must know."""
+    notes: list[str] = []
+    if refit and camera.enough(LENGTHS[tool]) is not None:
+        notes.append(f"nothing to refit: {tool} says this camera exactly")
+    elif refit:
+        from cell.verbs.export.refit import refit as fitted  # the solver takes a while to load
+
+        found = fitted(camera, LENGTHS[tool])
+        camera = replace(found.camera, about=f"{camera.about}; {found.words}")
+        notes.append(found.words)
+    domain = domain_of(camera)
+    if domain is not None:
+        camera = replace(camera, about=f"{camera.about}; {domain.words}")
+        notes.append(domain.words)
+    return camera, tuple(notes)
 
 
 def _camera(

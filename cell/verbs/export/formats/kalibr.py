@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from cell.verbs.export.camera import Camera
 
+LENGTHS = (4,)
+
 
 def text(camera: Camera) -> str:
     """A `camchain.yaml`: intrinsics fu, fv, pu, pv, and k1, k2, r1, r2.
@@ -11,7 +13,7 @@ def text(camera: Camera) -> str:
     Kalibr's radtan has four coefficients: a third radial term is refused, not dropped. Pixel
     coordinates are OpenCV's.
     """
-    d = camera.coefficients((4,), "kalibr")
+    d = camera.coefficients(LENGTHS, "kalibr")
     width, height = camera.size_px("kalibr")
     intrinsics = (camera.alpha_px, camera.beta_px, camera.u0_px, camera.v0_px)
     return (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cell.verbs.export.camera import Camera
 
 _MODELS = {5: "plumb_bob", 8: "rational_polynomial"}
+LENGTHS = tuple(_MODELS)
 
 
 def text(camera: Camera) -> str:
@@ -13,7 +14,7 @@ def text(camera: Camera) -> str:
     R is the identity and P repeats K: the camera is one, and its rectified picture keeps its
     focal length. ROS takes pixel coordinates as OpenCV does.
     """
-    d = camera.coefficients(tuple(_MODELS), "ros")
+    d = camera.coefficients(LENGTHS, "ros")
     a, b, u, v = camera.alpha_px, camera.beta_px, camera.u0_px, camera.v0_px
     width, height = camera.size_px("ros")
     lines = [

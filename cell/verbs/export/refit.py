@@ -1,0 +1,114 @@
+"""The best fit of a camera by a model with fewer coefficients, and how far it is off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from calib.chain.projection import project
+from calib.views import FloatArray
+from cell.storage.files.calibration_source import DISTORTION
+from cell.verbs.export.camera import Camera
+
+_DIRECTIONS, _RADII, _STEPS = 48, 24, 400
+_WIDEST_RAD = np.radians(85.0)
+_EXACT_PX = 1e-3
+"""A shorter list of coefficients serves where no pixel is farther off than this."""
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A camera that a tool can say, and its distance from the exact one over the picture."""
+
+    camera: Camera
+    rms_px: float
+    worst_px: float
+
+    @property
+    def words(self) -> str:
+        """For a warning and a file's comment."""
+        return (
+            f"refitted with fewer coefficients: off the calibrated camera by {self.rms_px:.3g} px"
+            f" rms, {self.worst_px:.3g} px at worst, over all of the picture where that holds"
+        )
+
+
+def refit(camera: Camera, lengths: tuple[int, ...]) -> Refit:
+    """Fit focal lengths, principal point and coefficients of a tool's model to a camera.
+
+    Parameters
+    ----------
+    camera:
+        The exact one; its picture's size must be known.
+    lengths:
+        How many coefficients of `DISTORTION` the tool takes.
+    """
+    rays, pixels, weight = field(camera)
+    best: Refit | None = None
+    for length in sorted(lengths):
+        found = _fitted(camera, length, rays, pixels, weight)
+        if best is None or found.rms_px < best.rms_px:
+            best = found
+        if best.worst_px < _EXACT_PX:
+            break
+    assert best is not None
+    return best
+
+
+def _fitted(
+    camera: Camera, length: int, rays: FloatArray, pixels: FloatArray, weight: FloatArray
+) -> Refit:
+    def with_numbers(x: FloatArray) -> Camera:
+        tail = (0.0,) * (len(DISTORTION) - length)
+        alpha, beta, u0, v0 = (float(value) for value in x[:4])
+        return replace(
+            camera, alpha_px=alpha, beta_px=beta, u0_px=u0, v0_px=v0,
+            distortion=(*(float(value) for value in x[4:]), *tail),
+        )  # fmt: skip
+
+    def off(x: FloatArray) -> FloatArray:
+        return np.asarray(_seen(with_numbers(x), rays) - pixels)
+
+    def weighted(x: FloatArray) -> FloatArray:
+        return np.asarray((weight[:, None] * off(x)).ravel())
+
+    start = np.array([camera.alpha_px, camera.beta_px, camera.u0_px, camera.v0_px,
+                      *camera.distortion[:length]])  # fmt: skip
+    found = least_squares(weighted, start, x_scale="jac", method="lm", xtol=1e-12, ftol=1e-12)
+    length_px = np.linalg.norm(off(found.x), axis=1)
+    rms = np.sqrt(np.average(length_px**2, weights=weight**2))
+    return Refit(with_numbers(found.x), float(rms), float(length_px.max()))
+
+
+def field(camera: Camera) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(P, 3) lines of sight over the picture, (P, 2) their pixels, (P,) roots of their areas.
+
+    In each direction from the principal point out to the picture's edge, or to where the
+    distortion folds.
+    """
+    width, height = camera.size_px("a refit")
+    around = np.linspace(0.0, 2 * np.pi, _DIRECTIONS, endpoint=False)
+    toward = np.stack([np.cos(around), np.sin(around)], axis=1)
+    r = np.tan(np.linspace(0.0, _WIDEST_RAD, _STEPS))
+    rays = np.concatenate(
+        [r[None, :, None] * toward[:, None], np.ones((len(toward), len(r), 1))], 2
+    )
+    pixels = _seen(camera, rays.reshape(-1, 3)).reshape(len(toward), len(r), 2)
+    radius = np.linalg.norm(pixels - [camera.u0_px, camera.v0_px], axis=2)
+    inside = ((pixels >= -0.5) & (pixels <= [width - 0.5, height - 0.5])).all(axis=2)
+    chosen = []
+    for direction, out, within in zip(toward, radius, inside, strict=True):
+        grows = np.append(np.diff(out) > 0, False) & within
+        last = max(int((~grows).argmax()), 1)
+        at = np.interp(np.linspace(0.0, out[last - 1], _RADII + 1)[1:], out[:last], r[:last])
+        chosen.append(np.column_stack([at[:, None] * direction, np.ones(_RADII)]))
+    kept = np.concatenate(chosen)
+    seen = _seen(camera, kept)
+    weight = np.sqrt(np.linalg.norm(seen - [camera.u0_px, camera.v0_px], axis=1))
+    return kept, seen, np.asarray(weight / weight.max())
+
+
+def _seen(camera: Camera, rays: FloatArray) -> FloatArray:
+    return np.asarray(project(camera.optics[None], np.eye(4)[None], rays)[0])
