@@ -4,9 +4,10 @@
 # mrcal-from-ros of the same version refuses rational_polynomial with 14 coefficients.
 # Seen on 2026-11-29 with Python 3.12 and NumPy 2. Needs python3.12 (mrcal has no wheels for 3.11).
 set -eu
-PYTHON=${PYTHON:-$(command -v python3.12 || ls "$HOME"/.pyenv/versions/3.12*/bin/python | head -1)}
 work=$(mktemp -d); trap 'rm -rf "$work"' EXIT; cd "$work"
-"$PYTHON" -m venv v
+for p in python3.12 python3.13 "${PYENV_ROOT:-$HOME/.pyenv}"/versions/3.1[23]*/bin/python; do
+  "$p" -m venv v 2> /dev/null && break
+done
 v/bin/python -m pip install --quiet --no-deps mrcal==2.5.2.post1 numpy==2.5.5 numpysane==0.45 \
   packaging pyyaml==6.0.4
 cat > a.cameramodel <<'MODEL'

@@ -97,7 +97,8 @@ def field(camera: Camera) -> tuple[FloatArray, FloatArray, FloatArray]:
     )
     pixels = _seen(camera, rays.reshape(-1, 3)).reshape(len(toward), len(r), 2)
     radius = np.linalg.norm(pixels - [camera.u0_px, camera.v0_px], axis=2)
-    inside = ((pixels >= -0.5) & (pixels <= [width - 0.5, height - 0.5])).all(axis=2)
+    on_picture = (pixels >= -0.5) & (pixels <= [width - 0.5, height - 0.5])
+    inside = np.asarray(np.all(on_picture, axis=2))
     chosen = []
     for direction, out, within in zip(toward, radius, inside, strict=True):
         grows = np.append(np.diff(out) > 0, False) & within
