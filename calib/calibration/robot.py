@@ -13,13 +13,13 @@ import numpy as np
 
 from calib.calibration.held_out_check import vindicated
 from calib.calibration.joint_lens import with_deserved_terms
-from calib.calibration.result import VALUES, RobotReference
+from calib.calibration.picture_evidence import picture_evidence
+from calib.calibration.result import RobotReference
 from calib.chain.effects import make_effect
-from calib.chain.model import CellModel, evaluate
+from calib.chain.model import CellModel
 from calib.chain.optics import COLUMN
 from calib.errors import CalibrationError
 from calib.handeye import HandEye, solve_hand_eye
-from calib.solver.free_poses import fit_free_poses
 from calib.solver.joint import JointFit, fit_joint
 from calib.solver.noise import Noise
 from calib.solver.unknowns import PLAIN_OPTICS, unknowns_of
@@ -28,10 +28,9 @@ from calib.views import BoolArray, FloatArray, Views
 DECISIVE_AIC = 30.0
 """Far above chance: an arm with errors of its own bends the joint fit by some tens."""
 
-PICTURE_GAIN = 9.0
-"""Three sigmas, for a law with nothing free in it."""
+THREE_SIGMAS = 9.0
+"""Of the pictures' chi-square, for a law with nothing free in it."""
 
-PICTURE_LOSS = -4.0
 REPEATABLE_M, REPEATABLE_RAD = 1e-4, 5e-4
 """What data sheets promise: an arm whose scatter is below both has no errors worth a law."""
 
@@ -160,20 +159,24 @@ def _best_lens(plain: CellModel, views: Views, noise: Noise) -> tuple[str | None
 
     An arm that is off bends the joint fit, too, and a law that bends likewise then gains. The
     pictures know nothing of the arm: with free poses, they must bear the law out by themselves,
-    or, where the arm keeps to its repeatability, at least not speak against it.
+    or, where the arm keeps to its repeatability, at least not contradict its amount.
     """
     still = _fit(plain, views, noise)
     best: tuple[str | None, JointFit] = (None, still)
-    by_pictures = _picture_cost(still, still, views)
     for law in _FOCUS_LAWS:
         effect = make_effect("focus_breathing", {"law": law})
         moving = _fit(still.model.with_effects([effect]), views, still.noise)
-        picture_gain = by_pictures - _picture_cost(moving, still, views)
-        enough = PICTURE_LOSS if _arm_is_true(moving) else PICTURE_GAIN
-        if picture_gain > enough and _aic(moving) < _aic(best[1]):
+        if _aic(moving) < _aic(best[1]) and _borne_out(still, moving, views):
             best = (law, moving)
     gain = _aic(still) - _aic(best[1])
     return (*best, gain) if gain >= DECISIVE_AIC else (None, still, gain)
+
+
+def _borne_out(still: JointFit, moving: JointFit, views: Views) -> bool:
+    pictures = picture_evidence(still, moving, views)
+    if _arm_is_true(moving):
+        return pictures.deviation < THREE_SIGMAS
+    return pictures.gain > THREE_SIGMAS
 
 
 def _fit(model: CellModel, views: Views, noise: Noise) -> JointFit:
@@ -183,21 +186,6 @@ def _fit(model: CellModel, views: Views, noise: Noise) -> JointFit:
 def _arm_is_true(fit: JointFit) -> bool:
     noise = fit.noise
     return noise.flange_m < REPEATABLE_M and noise.flange_rad < REPEATABLE_RAD
-
-
-def _picture_cost(fit: JointFit, still: JointFit, views: Views) -> float:
-    """-2 log likelihood of the pictures alone: poses and camera free, the law's shape held."""
-    state = evaluate(fit.model, views, flange_error=fit.flange_error)
-    free = fit_free_poses(
-        state.optics,
-        state.camera_from_board,
-        state.points_m,
-        views.corners_px,
-        VALUES,
-        weight=still.weight,
-    )
-    square = np.nansum(free.residual_px**2, axis=2) * still.weight
-    return float(square.sum()) / still.noise.corner_px**2
 
 
 def _aic(fit: JointFit) -> float:
