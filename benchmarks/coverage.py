@@ -176,14 +176,14 @@ def pulls_in_use(fit: JointFit, true: CellModel, views: Views) -> dict[str, list
     pixels = IMAGE_SHARES * [views.width_px, views.height_px]
     off_px, off_m = [], []
     for d in USED_AT_M:
-        is_, told = (optics_at(cell, views, float(d)) for cell in (true, fit.model))
+        is_, reported = (optics_at(cell, views, float(d)) for cell in (true, fit.model))
         at = ahead(is_, pixels, float(d))
-        off_px.append(project(told[None], found_from_true[None], at)[0] - pixels)
+        off_px.append(project(reported[None], found_from_true[None], at)[0] - pixels)
         part = flat_part(is_, views, float(d))
         poses = rigid.compose(np.zeros_like(at), at)
         n = len(poses)
         seen = project(np.repeat(is_[None], n, 0), poses, part)
-        located = fit_free_poses(np.repeat(told[None], n, 0), poses, part, seen, ())
+        located = fit_free_poses(np.repeat(reported[None], n, 0), poses, part, seen, ())
         place = located.camera_from_board[:, :3, 3]
         off_m.append(place @ back[:3, :3].T + back[:3, 3] - at)
     sigma_px = projection_sigma_px(fit, views, pixels, USED_AT_M)
@@ -256,8 +256,8 @@ def table(runs: list[Run]) -> list[str]:
         alpha = [r.alpha_rms_px for r in own]
         depth = [1e3 * r.depth_rms_m for r in own]
         alone = [1e3 * r.picture_depth_rms_m for r in own]
-        told = " | ".join(spread(values) for values in (alpha, depth, alone))
-        lines.append(f"| {', '.join(cell)} | {len(own)} | {told} |")
+        reported = " | ".join(spread(values) for values in (alpha, depth, alone))
+        lines.append(f"| {', '.join(cell)} | {len(own)} | {reported} |")
     lines += [
         "",
         "| number | coverage of the 95 % interval | rms of error / sigma |",

@@ -124,10 +124,10 @@ def numbers_13(cell: str) -> list[Number]:
         cell
     ]
     limits = "none" if zones is None else f"{zones.near_limit_m:.2f} m, {zones.far_limit_m:.2f} m"
-    told = {name: found.solutions[name].values["alpha_px"] for name in table if name in NAMES}
+    reported = {name: found.solutions[name].values["alpha_px"] for name in table if name in NAMES}
     return [
         Number("alpha far away", f"{table['proposed'][0]:g}", f"{found.alpha0['alpha_px']:.1f}"),
-        *(Number(NAMES[name], f"{table[name][0]:g}", f"{told[name]:.1f}") for name in told),
+        *(Number(NAMES[name], f"{table[name][0]:g}", f"{reported[name]:.1f}") for name in reported),
         Number("zone 2: from, to", paper_limits, limits),
         Number(
             f"one view's sigma at {near.distance_m:.2f} and {far.distance_m:.2f} m",
@@ -178,13 +178,13 @@ def figure_3() -> Figure:
     """True cameras and computed ones, from above and from the side."""
     found = run_named("irb140-eosens")
     true = positions_m(found.camera_from_board)
-    told = positions_m(found.solutions["zhang_mle"].camera_from_board)
+    reported = positions_m(found.solutions["zhang_mle"].camera_from_board)
     figure, axes = _panels(2)
     for axis, across, name in zip(axes, (0, 1), "xy", strict=True):
-        for a, b in zip(true, told, strict=True):
+        for a, b in zip(true, reported, strict=True):
             axis.plot([-a[2], -b[2]], [a[across], b[across]], color=GREY, linewidth=1)
         axis.plot(-true[:, 2], true[:, across], "*", color=BLUE, markersize=8, label="true")
-        axis.plot(-told[:, 2], told[:, across], "^", color=BLACK, label="Zhang, MLE")
+        axis.plot(-reported[:, 2], reported[:, across], "^", color=BLACK, label="Zhang, MLE")
         axis.plot([0, 0], [0, (0.225, 0.15)[across]], color=VERMILLION, linewidth=4, label="board")
         axis.set_xlabel("in front of the board, m")
         axis.set_ylabel(f"board {name}, m")

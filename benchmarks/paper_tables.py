@@ -82,8 +82,8 @@ def print_table_1(cell_name: str, found: Run) -> None:
     )
     errors = found.error
     for name in ROWS:
-        told = TABLE_1[cell_name].get(name)
-        paper = f"{told[0]:.4g} | {told[1]:.4f}" if told else "– | –"
+        reported = TABLE_1[cell_name].get(name)
+        paper = f"{reported[0]:.4g} | {reported[1]:.4f}" if reported else "– | –"
         pixels, error = found.solutions[name].reprojection_px, errors[name]
         print(
             f"| {NAMES[name]} | {paper} | {pixels['mean']:.1e} | {pixels['std']:.4f}"

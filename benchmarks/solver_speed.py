@@ -214,9 +214,9 @@ def line(
     """One row of the table."""
     if one is None:
         return
-    told = f"{goal}" if goal is not None and who.startswith("ours") else ""
+    reported = f"{goal}" if goal is not None and who.startswith("ours") else ""
     memory = f"{one['peak_mb']:.0f} | {one['before_mb']:.0f} | {one['files_mb']:.0f}"
-    print(f"| {work} | {who} | {one['seconds']:.3f} | {told} | {memory} | {gap} |", flush=True)
+    print(f"| {work} | {who} | {one['seconds']:.3f} | {reported} | {memory} | {gap} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -52,10 +52,10 @@ for _ in range(int(sys.argv[2])):
     began = time.process_time()
     result = solve(data)
     times.append(time.process_time() - began)
-told = {
+reported = {
     "seconds": min(times),
     "before_mb": before_mb,
     "peak_mb": memory_mb("VmHWM"),
     "files_mb": memory_mb("RssFile"),
 }
-print(json.dumps({**told, "result": result.tolist()}))
+print(json.dumps({**reported, "result": result.tolist()}))

@@ -110,14 +110,14 @@ def main():
         work.began = time.process_time()
         result = work.solve()
         times.append(time.process_time() - work.began)
-    told = {
+    reported = {
         "seconds": min(times),
         "median": float(np.median(times)) if len(times) > 2 else None,
         "before_mb": before_mb,
         "peak_mb": memory_mb("VmHWM"),
         "files_mb": memory_mb("RssFile"),
     }
-    print(json.dumps({**told, "result": result.tolist()}))
+    print(json.dumps({**reported, "result": result.tolist()}))
 
 
 if __name__ == "__main__":

@@ -90,15 +90,15 @@ def one_run(job: tuple[str, int]) -> list[tuple[str, str, Judgement, bool]]:
 def main(runs: int = 50, processes: int = 2, *plans: str) -> None:
     """Print what was told, by plan and case."""
     jobs = [(name, seed) for name in plans or PLANS for seed in range(1, runs + 1)]
-    told = []
+    reported = []
     with Pool(processes) as pool:
         for done, rows in enumerate(pool.imap_unordered(one_run, jobs), start=1):
-            told += rows
+            reported += rows
             print(f"\r{done} of {len(jobs)} runs", end="", file=sys.stderr)
     for name in plans or PLANS:
         print(f"{name}, {runs} runs, {SHORT} views each")
         for case, right in CASES.items():
-            rows = [(j, moved) for plan, c, j, moved in told if plan == name and c == case]
+            rows = [(j, moved) for plan, c, j, moved in reported if plan == name and c == case]
             verdicts = Counter(j.verdict for j, _ in rows)
             board = sum(j.board.moved == moved for j, moved in rows)
             others = ", ".join(f"{n} {v}" for v, n in verdicts.items() if v != right)
@@ -106,8 +106,8 @@ def main(runs: int = 50, processes: int = 2, *plans: str) -> None:
                 f"  {case:24} {right}: {verdicts[right]}/{len(rows)}"
                 f"{'; else ' + others if others else ''}; board told rightly {board}/{len(rows)}"
             )
-        null = sorted(j.p_value for plan, c, j, _ in told if plan == name and c == "nothing")
-        arm = [j.arm_ratio for plan, c, j, _ in told if plan == name and c == "nothing"]
+        null = sorted(j.p_value for plan, c, j, _ in reported if plan == name and c == "nothing")
+        arm = [j.arm_ratio for plan, c, j, _ in reported if plan == name and c == "nothing"]
         low = np.round(np.quantile(null, [0, 0.05, 0.1, 0.5, 0.9]), 4)
         print(f"  p values where nothing changed, quantiles 0, 5, 10, 50, 90 %: {low}")
         print(f"  scatter of the arm, now over then: {np.round(np.quantile(arm, [0, 0.5, 1]), 2)}")

@@ -30,7 +30,7 @@ _NO_UNIT_SHARE = 0.1
 
 _SAME_UNIT = 0.3
 _LATERAL, _DEPTH, _ANGLES = slice(0, 2), slice(2, 3), slice(3, 6)
-_TELLING = np.array([True, True, False, True, True, True])
+_DECIDING = np.array([True, True, False, True, True, True])
 _NOT_ANOTHER_POSE = np.array([3e-3] * 3 + [np.radians(0.5)] * 3)
 """Metres and radians below which a frame does not carry another frame's pose, however exact the
 others are; far views and a wrong focal length reach such values honestly."""
@@ -324,8 +324,8 @@ def _refine(
     residual = problem.residuals(X, Z)
     standard = residual / problem.scales(residual[used])
     # A lens that moves its focus shifts good frames along the axis, and only there.
-    telling = np.abs(standard[:, _TELLING])
+    deciding = np.abs(standard[:, _DECIDING])
     small = np.abs(residual) < _NOT_ANOTHER_POSE
-    distance = np.where(small.all(axis=1, where=_TELLING), 0.0, telling.max(axis=1))
+    distance = np.where(small.all(axis=1, where=_DECIDING), 0.0, deciding.max(axis=1))
     distance = np.nan_to_num(distance, nan=np.inf)
     return X, Z, covariance, distance

@@ -230,14 +230,14 @@ def _frame_right(concealed: Concealed, found: Diagnosis) -> bool | None:
         return None
     recorded = np.flatnonzero(~concealed.ahead)
     before = int(recorded[recorded < concealed.from_frame].max(initial=-1))
-    told = {
+    reported = {
         int(value.value)
         for effect in found.effects
         for name, value in effect.parameters.items()
         if name in ("at_frame", "from_frame")
     }
     words = " ".join(effect.physics for effect in found.effects)
-    inside = any(before < frame <= concealed.from_frame for frame in told)
+    inside = any(before < frame <= concealed.from_frame for frame in reported)
     return inside or str(concealed.from_frame) in words
 
 

@@ -225,10 +225,10 @@ def stops_of(stand: Stand, folder: Path, name: str, kind: Kind, count: int, seed
 
 
 def worst(values: list[float | None]) -> str:
-    told = [value for value in values if value is not None]
-    missing = len(values) - len(told)
-    worst = f"{max(told):.3f} s" if told else "-"
-    return f"{worst}, {missing} never" if told and missing else worst
+    reported = [value for value in values if value is not None]
+    missing = len(values) - len(reported)
+    worst = f"{max(reported):.3f} s" if reported else "-"
+    return f"{worst}, {missing} never" if reported and missing else worst
 
 
 def _row(name: str, kind: Kind, found: list[Any]) -> str:

@@ -94,10 +94,10 @@ def bound_memory() -> None:
 def summary(kind: Kind, outcome: Outcome) -> str:
     """One line."""
     kinds = Counter(outcome.bad.values())
-    told = "; ".join(f"{count} x {what}" for what, count in kinds.most_common(3))
+    reported = "; ".join(f"{count} x {what}" for what, count in kinds.most_common(3))
     return (
         f"{kind.name:28s} {outcome.inputs:7d} inputs {outcome.refused:7d} refused"
-        f" {len(outcome.bad):4d} bad {outcome.slowest_s:6.2f} s {told}"
+        f" {len(outcome.bad):4d} bad {outcome.slowest_s:6.2f} s {reported}"
     )
 
 

@@ -67,10 +67,10 @@ def _universal_robots() -> Iterator[Kind]:
         (_kinematics(),),
         _at((address, PRIMARY_PORT), lambda _: read_kinematics(address, _WAIT_S), Talk.TELLS),
     )
-    told = {"info": {"version": "5.0.107"}, "mode": "RUNNING", "marketingVersion": "10.14"}
+    reported = {"info": {"version": "5.0.107"}, "mode": "RUNNING", "marketingVersion": "10.14"}
     yield Kind(
         "robot API",
-        (_http(json.dumps(told).encode()),),
+        (_http(json.dumps(reported).encode()),),
         _at(("127.0.0.1", 0), _robot_api, Talk.ANSWERS),
     )
 

@@ -156,5 +156,5 @@ def frames_in_words(frames: tuple[int, ...] | list[int]) -> str:
             runs[-1].append(frame)
         else:
             runs.append([frame])
-    told = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
-    return f"frame {told[0]}" if len(frames) == 1 else f"frames {', '.join(told)}"
+    reported = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
+    return f"frame {reported[0]}" if len(frames) == 1 else f"frames {', '.join(reported)}"

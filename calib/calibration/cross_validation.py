@@ -283,8 +283,8 @@ def _pulls(
         variance = np.einsum("qi,ij,qj->q", rows, without - covariance, rows)
         z = np.abs(move) / np.sqrt(np.maximum(variance, _ROUNDING**2 * sigma**2))
         share = np.abs(move) / sigma
-        telling = np.where((z > limit) & (share > _MATTERS), share, 0.0)
-        worst = int(telling.argmax())
-        if telling[worst] > 0.0:
+        deciding = np.where((z > limit) & (share > _MATTERS), share, 0.0)
+        worst = int(deciding.argmax())
+        if deciding[worst] > 0.0:
             found.append(Pull(int(frame), names[worst], float(share[worst]), float(z[worst])))
     return tuple(sorted(found, key=lambda pull: -pull.sigmas))

@@ -101,11 +101,11 @@ def run_paper_method(
         missing["parallel_views"] = note
     if alpha.choice is None:
         missing["focus_law"] = f"{len(factors)} near-parallel views; a law needs 5"
-    told = {
-        name: _tell_at(solution, alpha.law, beta, zones, factors, distance)
+    reported = {
+        name: _values_at(solution, alpha.law, beta, zones, factors, distance)
         for name, solution in solutions.items()
     }
-    return PaperResult(factors, alpha.choice, beta, zones, told, missing)
+    return PaperResult(factors, alpha.choice, beta, zones, reported, missing)
 
 
 def _views_for_scale(part: BoolArray, robot_poses: FloatArray) -> tuple[BoolArray, str]:
@@ -257,7 +257,7 @@ def _fixed_alpha(
     }
 
 
-def _tell_at(
+def _values_at(
     solution: Solution,
     alpha: FocusLaw,
     beta: FocusLaw,
@@ -269,13 +269,13 @@ def _tell_at(
     sigma = dict(solution.sigma)
     if zones is not None:
         at = None
-        told = {"alpha_px": zones.alpha_px, "beta_px": zones.beta_px}
+        reported = {"alpha_px": zones.alpha_px, "beta_px": zones.beta_px}
         sigma |= {"alpha_px": zones.alpha_sigma_px, "beta_px": zones.beta_sigma_px}
     else:
         at = float(np.median(distance[np.isfinite(solution.optics[:, COLUMN["alpha_px"]])]))
-        told = {"alpha_px": float(alpha.scale_px(at)), "beta_px": float(beta.scale_px(at))}
+        reported = {"alpha_px": float(alpha.scale_px(at)), "beta_px": float(beta.scale_px(at))}
         sigma |= {
             "alpha_px": float(alpha.sigma_px(at)[0]),
             "beta_px": float(beta.sigma_px(at)[0]),
         }
-    return replace(solution, values={**solution.values, **told}, sigma=sigma, at_distance_m=at)
+    return replace(solution, values={**solution.values, **reported}, sigma=sigma, at_distance_m=at)

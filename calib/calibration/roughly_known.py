@@ -32,12 +32,12 @@ _BREATHING_SHARE = 0.03
 _USUAL_NOISE = Noise(corner_px=0.5, flange_m=5e-4, flange_rad=5e-4)
 """Until the frames can tell: a lens with terms of its own, an arm that was never calibrated."""
 
-FRAMES_TELL_NOISE = 8
+FRAMES_FOR_NOISE = 8
 _STEP_SIGMA = 0.3
 
 
 @dataclass(frozen=True)
-class Doubt:
+class GuessSigma:
     """How far a guess may be off, one sigma.
 
     Attributes
@@ -106,29 +106,29 @@ def guess_from_one_view(
     )
 
 
-def fit_roughly_known(views: Views, guess: CellModel, doubt: Doubt) -> JointFit:
+def fit_roughly_known(views: Views, guess: CellModel, prior_sigma: GuessSigma) -> JointFit:
     """The joint fit of N >= 1 views about a guess.
 
-    The noise levels are estimated from `FRAMES_TELL_NOISE` views on.
+    The noise levels are estimated from `FRAMES_FOR_NOISE` views on.
     """
-    sigma = _prior_sigma(guess, views, doubt)
+    sigma = _prior_sigma(guess, views, prior_sigma)
     unknowns = tuple(replace(u, prior_sigma=sigma.get(u.name, np.inf)) for u in unknowns_of(guess))
-    told = len(views) >= FRAMES_TELL_NOISE
-    return fit_joint(guess, views, unknowns, _USUAL_NOISE, fixed_noise=not told, about=guess)
+    reported = len(views) >= FRAMES_FOR_NOISE
+    return fit_joint(guess, views, unknowns, _USUAL_NOISE, fixed_noise=not reported, about=guess)
 
 
-def _prior_sigma(guess: CellModel, views: Views, doubt: Doubt) -> dict[str, float]:
+def _prior_sigma(guess: CellModel, views: Views, prior_sigma: GuessSigma) -> dict[str, float]:
     """One sigma by the unknown's name, for those that are not free."""
     alpha_px = float(guess.optics[COLUMN["alpha_px"]])
     sigma = {
-        "alpha_px": doubt.alpha_share * alpha_px,
-        "beta_px": doubt.alpha_share * alpha_px,
+        "alpha_px": prior_sigma.alpha_share * alpha_px,
+        "beta_px": prior_sigma.alpha_share * alpha_px,
         "u0_px": _CENTRE_SHARE * views.width_px,
         "v0_px": _CENTRE_SHARE * views.width_px,
         **_RADIAL,
     }
-    sigma |= {f"flange_from_mounted.{axis}": doubt.mounted_m for axis in "xyz"}
-    sigma |= {f"flange_from_mounted.r{axis}": doubt.mounted_rad for axis in "xyz"}
+    sigma |= {f"flange_from_mounted.{axis}": prior_sigma.mounted_m for axis in "xyz"}
+    sigma |= {f"flange_from_mounted.r{axis}": prior_sigma.mounted_rad for axis in "xyz"}
     distance_m = float(evaluate(guess, views).distance_m[0])
     breathing = _BREATHING_SHARE * alpha_px * distance_m**2
     return sigma | {f"{e.effect.label}.k_px_m2": breathing for e in guess.effects}

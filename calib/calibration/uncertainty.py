@@ -219,14 +219,16 @@ def _change_of_pixels(joint: Estimate, shown: Views) -> FloatArray:
     return _change(joint, lambda model: predict(model, shown), camera)
 
 
-def _change(joint: Estimate, told: Callable[[CellModel], FloatArray], by: BoolArray) -> FloatArray:
+def _change(
+    joint: Estimate, quantity: Callable[[CellModel], FloatArray], by: BoolArray
+) -> FloatArray:
     """(..., p) of what a cell tells, by those of the p numbers; central differences."""
     sigma = np.sqrt(np.diag(joint.covariance))
-    change = np.zeros((*told(joint.model).shape, len(sigma)))
+    change = np.zeros((*quantity(joint.model).shape, len(sigma)))
     for k in np.flatnonzero(by):
         step = np.zeros(len(sigma))
         step[k] = _STEP_SIGMA * sigma[k]
-        ahead, behind = (told(moved(joint.model, joint.unknowns, s)) for s in (step, -step))
+        ahead, behind = (quantity(moved(joint.model, joint.unknowns, s)) for s in (step, -step))
         change[..., k] = (ahead - behind) / (2 * step[k])
     return change
 

@@ -24,8 +24,8 @@ _WORDS = {
 
 def why(found: CrossValidation) -> str:
     """The verdict with what it rests on."""
-    told = [*_moved(found), *_missed(found.held_out), *_carried(found)]
-    return " ".join(told or [_agree(found.held_out)])
+    reported = [*_moved(found), *_missed(found.held_out), *_carried(found)]
+    return " ".join(reported or [_agree(found.held_out)])
 
 
 def _agree(held: HeldOut) -> str:
@@ -39,10 +39,10 @@ def _agree(held: HeldOut) -> str:
 def _moved(found: CrossValidation) -> Iterator[str]:
     far, drifting = found.too_far, found.drifting
     if far:
-        told = listed([f"{_the(m.quantity)} {m.factor:.1f} times" for m in far])
+        reported = listed([f"{_the(m.quantity)} {m.factor:.1f} times" for m in far])
         yield (
             "Fits without a fifth of the frames each move farther than the stated uncertainty"
-            f" allows: {told}; take these sigmas so many times as large."
+            f" allows: {reported}; take these sigmas so many times as large."
         )
     if drifting:
         names = listed([_the(m.quantity) for m in drifting])

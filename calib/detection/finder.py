@@ -69,7 +69,7 @@ def find_chessboard(image: FloatImage, board: Board) -> tuple[Fitted, NDArray[np
     best: Rejected | None = None
     for found in _found(image, board):
         if isinstance(found, Rejected):
-            best = _more_telling(best, found)
+            best = _more_specific(best, found)
             continue
         scale, grid, coarse = found
         first = enlarged(coarse.parameters, scale)
@@ -84,7 +84,7 @@ def find_chessboard(image: FloatImage, board: Board) -> tuple[Fitted, NDArray[np
     return Rejected("the picture is too small") if best is None else best
 
 
-def _more_telling(before: Rejected | None, now: Rejected) -> Rejected:
+def _more_specific(before: Rejected | None, now: Rejected) -> Rejected:
     """Of two scales' reasons the one that saw more of a board."""
     if before is None or _PARTIAL in now.reason or before.reason == _NOTHING:
         return now

@@ -23,12 +23,12 @@ from calib.discovery.diagnosis import (
 from calib.discovery.history import with_history
 from calib.discovery.laws.arm_field import is_arm_field, made_anew
 from calib.discovery.laws.contest import law_leads
-from calib.discovery.laws.telling import told_law
+from calib.discovery.laws.found_law import found_law
 from calib.discovery.locate import Cell, locate
 from calib.discovery.log_consistency.branches import choose_branches, with_branches
 from calib.discovery.log_consistency.mixup import Mixup
 from calib.discovery.log_repair import LogRepair, repair_log
-from calib.discovery.pictures import fit_blur, told_of
+from calib.discovery.pictures import blur_notes, fit_blur
 from calib.discovery.prediction_gate import Dropped, drop_what_predicts_worse
 from calib.discovery.prove import held_out, prediction_rms_px, prove
 from calib.discovery.rejections import LostFrames, lost_frames
@@ -42,8 +42,8 @@ from calib.solver.joint import JointFit, frame_errors
 from calib.solver.noise import Noise, profile
 from calib.views import BoolArray, Views
 
-_MISMATCHES_TOLD = 8
-_WORTH_TELLING = 1e-3
+_MISMATCHES_SHOWN = 8
+_WORTH_REPORTING = 1e-3
 
 
 def diagnose(
@@ -268,17 +268,17 @@ def _unexplained(
 ) -> tuple[Unexplained, ...]:
     """Every term without a name, with its law where there is one."""
     labels = [present.effect.label for present in fits.after.model.effects]
-    told = []
+    reported = []
     for cell in structure.cells:
         law = None
         if cell.law is not None:
             index = labels.index(cell.law.effect.label)
             lost = _missed(fits, index, held, fitter)[1]
-            law = told_law(fits.twin, index, lost, cell.rivals)
-        told.append(
+            law = found_law(fits.twin, index, lost, cell.rivals)
+        reported.append(
             Unexplained(cell.link, cell.site, cell.covariate, cell.where, cell.p_value, law)
         )
-    return tuple(told)
+    return tuple(reported)
 
 
 def _missed(fits: _Fits, index: int, held: Views, fitter: Fitter) -> tuple[JointFit, float]:
@@ -294,12 +294,12 @@ def _missed(fits: _Fits, index: int, held: Views, fitter: Fitter) -> tuple[Joint
 def _mismatches(fits: _Fits, fitter: Fitter) -> tuple[Mismatch, ...]:
     """Where the plain cell misses, judged by the noise that the final cell leaves."""
     judged = replace(fits.plain, noise=_judge(fits.plain.noise, fits.twin.noise))
-    cells = [c for c in locate(judged, fitter.views) if c.p_value < _WORTH_TELLING]
+    cells = [c for c in locate(judged, fitter.views) if c.p_value < _WORTH_REPORTING]
     excess = _excess(judged)
-    told: list[Cell] = []
+    reported: list[Cell] = []
     for cell in sorted(cells, key=lambda c: -c.score.gain):
-        if all((cell.site, cell.covariate) != (t.site, t.covariate) for t in told):
-            told.append(cell)
+        if all((cell.site, cell.covariate) != (t.site, t.covariate) for t in reported):
+            reported.append(cell)
     return tuple(
         Mismatch(
             link=c.link,
@@ -309,7 +309,7 @@ def _mismatches(fits: _Fits, fitter: Fitter) -> tuple[Mismatch, ...]:
             share_of_excess=min(1.0, c.score.gain / excess),
             p_value=c.p_value,
         )
-        for c in told[:_MISMATCHES_TOLD]
+        for c in reported[:_MISMATCHES_SHOWN]
     )
 
 
@@ -330,7 +330,7 @@ def _excess(fit: JointFit) -> float:
 
 def _pictures(twin: JointFit, views: Views) -> tuple[str, ...]:
     state = evaluate(twin.model, views, **frame_errors(twin.own_error))
-    return told_of(fit_blur(views.blur_px, state.distance_m))
+    return blur_notes(fit_blur(views.blur_px, state.distance_m))
 
 
 def _unseen(views: Views) -> tuple[str, ...]:

@@ -79,7 +79,7 @@ def fit_blur(blur_px: FloatArray, distance_m: FloatArray) -> BlurCurve | None:
     )
 
 
-def told_of(curve: BlurCurve | None) -> tuple[str, ...]:
+def blur_notes(curve: BlurCurve | None) -> tuple[str, ...]:
     """A sentence about the blur, where pictures were seen."""
     if curve is None:
         return ()

@@ -157,5 +157,5 @@ def _told_anew(structure: ResidualStructure) -> ResidualStructure:
 
 
 def _what_is_left(search: Search) -> list[Cell]:
-    told = alarms(locate(search.best.fit, search.views))
-    return [cell for cell in told if not is_shape_of_law(cell, search)][:1]
+    reported = alarms(locate(search.best.fit, search.views))
+    return [cell for cell in reported if not is_shape_of_law(cell, search)][:1]

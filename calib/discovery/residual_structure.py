@@ -81,8 +81,8 @@ def _carried(search: Search) -> list[Cell]:
         if law is not None:
             found.append(law)
             continue
-        told = alarms(locate(search.best.fit, views, periods=False))
-        cell = next((c for c in told if not is_shape_of_law(c, search)), None)
+        reported = alarms(locate(search.best.fit, views, periods=False))
+        cell = next((c for c in reported if not is_shape_of_law(c, search)), None)
         if cell is None or cell.score.gain < _REMAINDER * known:
             break
         found.append(cell)
@@ -100,13 +100,13 @@ def _law(search: Search, least: float) -> Cell | None:
     What gains less than `least` is what the laws before it have left of their own.
     """
     before = search.best
-    told = demanded(search)
-    if not told:
+    reported = demanded(search)
+    if not reported:
         return None
-    cell = as_cell(told, before)
+    cell = as_cell(reported, before)
     if cell.score.gain < least or is_shape_of_law(cell, search):
         return None
-    search.take_in(told[0].candidate, told[0].trial.fit)
+    search.take_in(reported[0].candidate, reported[0].trial.fit)
     search.run()
     return cell
 

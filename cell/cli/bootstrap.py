@@ -55,16 +55,16 @@ def bootstrap(
 
     Before: drive the arm by hand so that the whole board is in the picture.
     """
-    from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
+    from cell.verbs.bootstrap import Bootstrap, LayoutUncertainty
     from cell.views.terminal.progress import run_progress
 
     start = _angles(start_deg, dry_run)
     name = cell.name.split(".")[0]
     recording = output or new_folder(f"{name}-bootstrap")
-    told = LayoutDoubt(
+    reported = LayoutUncertainty(
         1e-3 * mount_mm, math.radians(mount_deg), 1e-3 * fixed_mm, reach_m=1e-3 * reach_mm
     )
-    task = Bootstrap.of(cell, recording, output or cell.parent, told)
+    task = Bootstrap.of(cell, recording, output or cell.parent, reported)
     devices = task.devices(dry_run=dry_run, start_deg=start)
     say(f"{'SIMULATED' if dry_run else 'real'} arm and camera; recording {recording}")
     with run_progress(simulated=dry_run) as terminal:

@@ -56,7 +56,7 @@ def plan(
         _power(cell, output, wish, as_json=as_json)
         return
     path = output or cell.with_name(cell.name.split(".")[0] + ".plan.yaml")
-    _tell(_written(cell, path, wish), as_json=as_json)
+    _print_plan(_written(cell, path, wish), as_json=as_json)
 
 
 def _designed(cell: Path, path: Path, wish: Requirements) -> Plan:
@@ -81,7 +81,7 @@ def _written(cell: Path, path: Path, wish: Requirements) -> Plan:
     return plan
 
 
-def _tell(plan: Plan, *, as_json: bool) -> None:
+def _print_plan(plan: Plan, *, as_json: bool) -> None:
     from cell.verbs.plan import clearance, expected_uncertainty, power
 
     stations = [view.station for view in plan.file.views]

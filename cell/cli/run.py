@@ -66,7 +66,7 @@ def run(
     read = read_plan(path)
     with shown_on_page(page, read, folder, dry_run=dry_run) as live:
 
-        def tell(words: str) -> None:
+        def report_progress(words: str) -> None:
             say(words)
             if live is not None:
                 live.say(words)
@@ -77,7 +77,9 @@ def run(
             say(f"skipped view {view}: {reason}")
         if outcome.complete and not record_only:
             truth = truth_of(path) if dry_run else None
-            outcome = evaluate(outcome, result, simulated=dry_run, truth=truth, tell=tell)
+            outcome = evaluate(
+                outcome, result, simulated=dry_run, truth=truth, report_progress=report_progress
+            )
         if live is not None:
             live.ended(outcome.text, outcome.files)
     report = outcome.mapping.get("report")

@@ -14,9 +14,9 @@ def words_of(error: BaseException) -> str:
     """What the operator is told of an error in the program itself; its trace goes into a file."""
     if isinstance(error, MemoryError):
         return "the memory of this computer is used up; use fewer or smaller pictures"
-    told = str(error).partition("\n")[0][:200]
+    reported = str(error).partition("\n")[0][:200]
     return (
-        f"an error in this program: {type(error).__name__}: {told}. {_kept(error)}"
+        f"an error in this program: {type(error).__name__}: {reported}. {_kept(error)}"
         " Please report it with that file; nothing that was recorded is lost."
     )
 

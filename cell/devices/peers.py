@@ -59,7 +59,7 @@ def peers(cell: SimulatedCell, arm: ArmWire, camera: CameraWire) -> Iterator[Wir
     process.start()
     there.close()
     try:
-        yield _told(here)
+        yield _received(here)
     finally:
         here.close()
         process.join(_END_S)
@@ -68,19 +68,19 @@ def peers(cell: SimulatedCell, arm: ArmWire, camera: CameraWire) -> Iterator[Wir
             process.join()
 
 
-def _told(link: Connection) -> Wires:
+def _received(link: Connection) -> Wires:
     try:
-        told = link.recv() if link.poll(_START_S) else f"did not start in {_START_S:g} s"
+        reported = link.recv() if link.poll(_START_S) else f"did not start in {_START_S:g} s"
     except EOFError:
-        told = "ended while starting"
-    if isinstance(told, Wires):
-        return told
-    if isinstance(told, OSError):
+        reported = "ended while starting"
+    if isinstance(reported, Wires):
+        return reported
+    if isinstance(reported, OSError):
         raise InputError(
-            f"the peers cannot listen on this machine's loopback addresses (127.0.0.0/8): {told}."
-            " End the other dry run with --peers, or leave --peers away."
+            "the peers cannot listen on this machine's loopback addresses (127.0.0.0/8): "
+            f"{reported}. End the other dry run with --peers, or leave --peers away."
         )
-    raise DeviceUnreachable(f"the peers of the dry run: {told}; run it without --peers")
+    raise DeviceUnreachable(f"the peers of the dry run: {reported}; run it without --peers")
 
 
 def _serve(

@@ -37,16 +37,16 @@ def scene_of(cell: CellFile, arm: ArmKinematics) -> Scene:
     return Scene(arm, bodies, cell.clearance_m)
 
 
-def doubtful_scene_of(cell: CellFile, arm: ArmKinematics, doubt_m: float) -> Scene:
+def doubtful_scene_of(cell: CellFile, arm: ArmKinematics, uncertainty_m: float) -> Scene:
     """The same where what hangs on the flange may be so far from where `layout` has it.
 
     The place of what it looks at is not known at all and left out.
     """
     flange = len(arm.dh)
     carried = tuple(carried_bodies(cell, flange))
-    around = [_wider(body, doubt_m) for body in carried]
+    around = [_wider(body, uncertainty_m) for body in carried]
     if cell.layout is None:
-        ball = capsule(np.zeros(3), np.zeros(3), doubt_m)
+        ball = capsule(np.zeros(3), np.zeros(3), uncertainty_m)
         around.append(Body("what is at the flange", flange, (ball,), carried=True, doubted=True))
     return Scene(
         arm, [*arm_bodies(arm)[0], *carried, *around, *standing_bodies(cell)], cell.clearance_m

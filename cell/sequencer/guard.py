@@ -118,12 +118,12 @@ class Guard:
         low, high = self.kinematics.limits_rad.T
         out = np.flatnonzero((joints_rad < low) | (joints_rad > high))
         if out.size:
-            told = ", ".join(
+            reported = ", ".join(
                 f"joint {i + 1} at {np.degrees(joints_rad[i]):.1f}° is outside"
                 f" {np.degrees(low[i]):.0f}..{np.degrees(high[i]):.0f}°"
                 for i in out
             )
-            raise SafetyError(f"{where}: {told}")
+            raise SafetyError(f"{where}: {reported}")
 
     def check_start(self, start_rad: FloatArray) -> None:
         """Raise `SafetyError` where the arm stands outside its limits.

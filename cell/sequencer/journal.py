@@ -12,7 +12,7 @@ from cell.errors import InputError
 from cell.storage.files.plan_file import Plan
 from cell.storage.incoming import plain_file, read_bytes
 from cell.storage.incoming.limits import LOG_BYTES
-from cell.storage.recording.disk import told, write_synced
+from cell.storage.recording.disk import disk_errors, write_synced
 
 FILE_NAME = "journal.jsonl"
 
@@ -43,7 +43,7 @@ class Journal:
         """Append one event and sync it to the disk; raises `DiskFailed`."""
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         line = json.dumps({"event": event, "at": now, **values}, default=str)
-        with told(self._path):
+        with disk_errors(self._path):
             write_synced(self._file, line.encode() + b"\n")
 
     def close(self) -> None:

@@ -141,23 +141,23 @@ class ReadingWatch:
         off = np.abs(joints - (here + share * travel))
         joint, off_rad = int(off.argmax()), float(off.max())
         if off_rad > self._allowed_rad:
-            told = f"joint {joint + 1} is {np.degrees(off_rad):.2f}°"
+            reported = f"joint {joint + 1} is {np.degrees(off_rad):.2f}°"
             if self._moves:
                 raise SafetyError(
-                    f"the arm left the way that was planned and checked: {told} beside it. Look"
+                    f"the arm left the way that was planned and checked: {reported} beside it. Look"
                     " what moves it: another program, a setting that blends moves, a person."
                 )
             raise SafetyError(
-                f"the arm was moved where it was to stand: {told} from there. Look who or what"
+                f"the arm was moved where it was to stand: {reported} from there. Look who or what"
                 " moves it: a person, another program, a brake that slips."
             )
         if off_rad > _ON_PATH_RAD:
             self._guard.check_move(joints, joints, "the arm is not where it was told to be")
 
     def _check_speed(self, state: ArmState) -> None:
-        told = state.joint_velocity_rad_s
-        if told is not None:
-            self._check_joint_speeds(np.abs(told))
+        reported = state.joint_velocity_rad_s
+        if reported is not None:
+            self._check_joint_speeds(np.abs(reported))
         first = self._recent[0]
         elapsed_s = _elapsed_s(first, state)
         if state.host_t_s - first.host_t_s < _SHORTEST_S:
@@ -186,10 +186,10 @@ class ReadingWatch:
     def _check_alive(self, first: ArmState, state: ArmState, elapsed_s: float) -> None:
         """A speed that moves nothing is an old reading's."""
         speeds = [reading.joint_velocity_rad_s for reading in self._recent]
-        told = [speed for speed in speeds if speed is not None]
-        if len(told) < len(speeds):
+        reported = [speed for speed in speeds if speed is not None]
+        if len(reported) < len(speeds):
             return
-        slowest_rad_s = float(np.abs(told).max(axis=1).min())
+        slowest_rad_s = float(np.abs(reported).max(axis=1).min())
         turned = np.abs(np.subtract(state.joints_rad or (), first.joints_rad or ())).max()
         if (
             slowest_rad_s > _STILL_RAD_S

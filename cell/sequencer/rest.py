@@ -98,8 +98,8 @@ def _joints(state: ArmState) -> FloatArray | None:
 
 def fastest_rad_s(state: ArmState) -> float:
     """Speed of the fastest joint as the controller tells it; 0 where it does not."""
-    told = state.joint_velocity_rad_s
-    return 0.0 if told is None else float(np.abs(told).max(initial=0.0))
+    reported = state.joint_velocity_rad_s
+    return 0.0 if reported is None else float(np.abs(reported).max(initial=0.0))
 
 
 def _moves(state: ArmState) -> bool:

@@ -135,14 +135,14 @@ class Sequencer:
             error = fault
         error = self._stop_arm(error)
         if error is not None:
-            self._tell(State.STOPPING)
+            self._notify(State.STOPPING)
             with suppress(DiskFailed):
                 self._keep_the_frame_in_hand()
         self._let_go()
         finish = finish_of(error, len(self._progress.skipped))
         reason = str(error or "") or (type(error).__name__ if error else "")
         self._note("stop", finish=finish.name.lower(), reason=reason or self._ended_early)
-        self._tell(State.FINISHED)
+        self._notify(State.FINISHED)
         if error is not None and exit_status_of(error) is None:
             raise error
         progress = self._progress
@@ -161,13 +161,13 @@ class Sequencer:
         if word is not None:
             self._note("halt", **vars(word))
             if fault is not None and word.stands:
-                self._tell(State.STOPPING, word.text)
+                self._notify(State.STOPPING, word.text)
         return error
 
     # -- one view after the other ------------------------------------------------------------
 
     def _connect(self) -> None:
-        self._tell(State.CONNECTING)
+        self._notify(State.CONNECTING)
         # before there is an arm to watch: a compiler keeps every other thread from running
         make_check_ready(self._plan.file.checks)
         start = self._arm.connect()
@@ -193,7 +193,7 @@ class Sequencer:
             self._come_from_the_view_before()
         while progress.todo or self._checking or self._one_more():
             if self._is_enough() or not progress.todo:
-                self._tell(State.CHECKING)
+                self._notify(State.CHECKING)
                 self._finish_check()
                 continue
             index = progress.todo.popleft()
@@ -206,7 +206,7 @@ class Sequencer:
     def _look_back(self) -> None:
         """A run gone on with may have enough already: wait for the goal before any move."""
         if self._goal is not None and self._progress.done:
-            self._tell(State.CHECKING, "looking whether the frames recorded before are enough")
+            self._notify(State.CHECKING, "looking whether the frames recorded before are enough")
             self._arm.await_job(self._goal.caught_up())
 
     def _is_enough(self) -> bool:
@@ -216,7 +216,7 @@ class Sequencer:
             self._ended_early = reason
             self._journal.write("enough", reason=reason, left=len(todo))
             todo.clear()
-            self._tell(self._state, f"ending early: {reason}")
+            self._notify(self._state, f"ending early: {reason}")
         return bool(reason)
 
     def _one_more(self) -> bool:
@@ -252,12 +252,12 @@ class Sequencer:
         """Move to a view and settle there; returns the (6,) joint angles the move came from."""
         self._index = index
         self._pause_if_asked()
-        self._tell(State.MOVING)
+        self._notify(State.MOVING)
         here = joints_of(self._arm.watch())
         there = self._arm.guard.joints_of(self._plan, index, here)
         came_from = self._arm.go(there, self._plan.where(index))
         self._pause_if_asked()
-        self._tell(State.SETTLING)
+        self._notify(State.SETTLING)
         self._arm.settle(self._plan.file.settle, self._plan.where(index))
         return came_from
 
@@ -267,13 +267,13 @@ class Sequencer:
             return
         began_s = self._clock.now()
         self._journal.write("pause", view=self._index)
-        self._tell(State.PAUSED, "paused; the arm stands at the end of its move")
+        self._notify(State.PAUSED, "paused; the arm stands at the end of its move")
         while self._requests.paused:
             self._arm.watch()
             self._requests.wait(POLL_S)
         self._journal.write("go on", view=self._index)
         self._time_left.began_s += self._clock.now() - began_s
-        self._tell(State.PAUSED, "going on")
+        self._notify(State.PAUSED, "going on")
 
     def _shoot(self, index: int, came_from: FloatArray) -> Shot | None:
         """Focus and grab until image and pose belong together; None where the view is given up.
@@ -286,9 +286,9 @@ class Sequencer:
         reopened = False
         while not self._requests.skips(index):
             try:
-                self._tell(State.FOCUSING)
+                self._notify(State.FOCUSING)
                 self._arm.await_job(self._worker.do(asked_of_camera(focus)))
-                self._tell(State.GRABBING)
+                self._notify(State.GRABBING)
                 frame, states = self._grab(exposure.timeout_s)
                 shot = Shot(index, frame, states, tuple(came_from.tolist()))
                 fault = shot.pose_fault(self._plan.file.checks)
@@ -322,7 +322,7 @@ class Sequencer:
             raise lost from None  # the run ends, which stops the arm again and says what is known
         self._journal.write("camera lost", view=index, reason=str(lost))
         name = self._plan.view_name(index)
-        self._tell(self._state, f"{name}: {lost}; opening the camera once more")
+        self._notify(self._state, f"{name}: {lost}; opening the camera once more")
         self._arm.await_job(self._worker.do(self._camera.connect))
         self._arm.settle(self._plan.file.settle, self._plan.where(index))
 
@@ -357,7 +357,7 @@ class Sequencer:
         if verdict.detection is not None:
             self._progress.detections[index] = verdict.detection
         self._journal.write("frame", view=index)
-        self._tell(self._state, f"frame {index} logged ({self._plan.view_name(index)})")
+        self._notify(self._state, f"frame {index} logged ({self._plan.view_name(index)})")
 
     def _again(self, index: int, fault: str) -> bool:
         """Whether a view that failed is to be taken again; skips or stops where it is not."""
@@ -366,7 +366,7 @@ class Sequencer:
         name = self._plan.view_name(index)
         if progress.attempts[index] < retry.attempts:
             self._journal.write("retry", view=index, reason=fault)
-            self._tell(self._state, f"{name}: {fault}; once more")
+            self._notify(self._state, f"{name}: {fault}; once more")
             return True
         if retry.then == "stop":
             raise BadAnswer(f"{name}: {fault} (tried {retry.attempts} times; retry.then is stop)")
@@ -381,7 +381,7 @@ class Sequencer:
     def _skip(self, index: int, reason: str) -> None:
         self._progress.skipped[index] = reason
         self._journal.write("skip", view=index, reason=reason)
-        self._tell(self._state, f"{self._plan.view_name(index)} skipped: {reason}")
+        self._notify(self._state, f"{self._plan.view_name(index)} skipped: {reason}")
 
     def _keep_the_frame_in_hand(self) -> None:
         """A whole frame that is being checked as the run ends is logged if it is good."""
@@ -405,7 +405,7 @@ class Sequencer:
         with suppress(DiskFailed):
             self._journal.write(event, **values)
 
-    def _tell(self, state: State, event: str | None = None) -> None:
+    def _notify(self, state: State, event: str | None = None) -> None:
         """Tell the watchers; one that fails (a terminal that is gone) is not told again."""
         self._state = state
         progress = self._progress
@@ -419,6 +419,6 @@ class Sequencer:
             event,
             self._index,
         )
-        self._watchers.told(status)
+        self._watchers.status_changed(status)
         while self._watchers.failures:
             self._note("listener failed", reason=self._watchers.failures.pop())

@@ -37,7 +37,7 @@ class Watcher:
     Override what is wanted.
     """
 
-    def told(self, status: Status) -> None:
+    def status_changed(self, status: Status) -> None:
         """The state has changed or something has happened; from the loop's thread."""
 
     def read(self, state: ArmState) -> None:
@@ -60,9 +60,9 @@ class Watchers:
         self._watching = tuple(watchers)
         self.failures: list[str] = []
 
-    def told(self, status: Status) -> None:
-        """See `Watcher.told`."""
-        self._each(lambda watcher: watcher.told(status))
+    def status_changed(self, status: Status) -> None:
+        """See `Watcher.status_changed`."""
+        self._each(lambda watcher: watcher.status_changed(status))
 
     def read(self, state: ArmState) -> None:
         """See `Watcher.read`."""
@@ -72,10 +72,10 @@ class Watchers:
         """See `Watcher.checked`."""
         self._each(lambda watcher: watcher.checked(checked))
 
-    def _each(self, tell: Callable[[Watcher], None]) -> None:
+    def _each(self, call: Callable[[Watcher], None]) -> None:
         for watcher in self._watching:
             try:
-                tell(watcher)
+                call(watcher)
             except Exception as fault:
                 self._watching = tuple(w for w in self._watching if w is not watcher)
                 self.failures.append(str(fault) or type(fault).__name__)

@@ -111,9 +111,9 @@ def _devices(recording: Recording, robot: dict[str, Any]) -> dict[str, Any]:
 
 def _first_reasons(corners: Corners) -> str:
     """The three first rejected frames with their reasons, to put behind an error."""
-    told = [f"\n  frame {frame}: {why}" for frame, why in list(corners.rejected.items())[:3]]
-    more = len(corners.rejected) - len(told)
-    return "".join(told) + (f"\n  and {more} frames more" if more > 0 else "")
+    reported = [f"\n  frame {frame}: {why}" for frame, why in list(corners.rejected.items())[:3]]
+    more = len(corners.rejected) - len(reported)
+    return "".join(reported) + (f"\n  and {more} frames more" if more > 0 else "")
 
 
 def default_folder(recording: Recording) -> Path:

@@ -187,12 +187,12 @@ def evaluate(
     *,
     simulated: bool,
     truth: CellModel | None = None,
-    tell: Callable[[str], None] = say,
+    report_progress: Callable[[str], None] = say,
 ) -> Outcome:
     """Calibrate and diagnose a finished run; the results go into the recording's folder.
 
-    `truth` is the simulated cell of a dry run; the report holds the results against it. `tell`
-    hears what is being done.
+    `truth` is the simulated cell of a dry run; the report holds the results against it.
+    `report_progress` hears what is being done.
 
     Raises
     ------
@@ -203,10 +203,10 @@ def evaluate(
     if not recording.has_detections:
         corners = corners_of_run(recording, result.detections)
         write_corners(outcome.folder / DETECTIONS, corners, recording.board)
-    tell("calibrating")
+    report_progress("calibrating")
     calibrated, folder = calibrate_into(recording, outcome.folder, simulated=simulated)
     for line in warning_lines(calibrated.mapping):
-        tell(line)
+        report_progress(line)
     calibrates = replace(
         outcome,
         undetermined=undetermined_words(calibrated.mapping),
@@ -215,7 +215,7 @@ def evaluate(
         | _files(folder, "calibration.json", "report.html")
         | {name: calibrated.mapping[name] for name in ("answer", "warnings", "undetermined")},
     )
-    tell("diagnosing; this takes a minute or more")
+    report_progress("diagnosing; this takes a minute or more")
     try:
         diagnosed = diagnose_into(
             recording, folder, simulated=simulated, calibrated=calibrated, truth=truth

@@ -72,8 +72,8 @@ class Rws2:
         """Whether RAPID runs, as `RAPIDExecutionState`."""
         from abb_robot_client.rws import RAPIDExecutionState
 
-        told = self._first("rw/rapid/execution")
-        return RAPIDExecutionState(told["ctrlexecstate"], told.get("cycle", "asis"))
+        reported = self._first("rw/rapid/execution")
+        return RAPIDExecutionState(reported["ctrlexecstate"], reported.get("cycle", "asis"))
 
     def resetpp(self) -> None:
         """Move the program pointers to main."""
@@ -99,10 +99,10 @@ class Rws2:
         """Joints, degrees, as `JointTarget`."""
         from abb_robot_client.rws import JointTarget
 
-        told = self._first(f"{_UNITS}/{mechunit}/jointtarget")
+        reported = self._first(f"{_UNITS}/{mechunit}/jointtarget")
         return JointTarget(
-            _numbers(told, [f"rax_{i}" for i in range(1, 7)]),
-            _numbers(told, [f"eax_{letter}" for letter in "abcdef"]),
+            _numbers(reported, [f"rax_{i}" for i in range(1, 7)]),
+            _numbers(reported, [f"eax_{letter}" for letter in "abcdef"]),
         )
 
     def get_robtarget(
@@ -116,12 +116,12 @@ class Rws2:
         from abb_robot_client.rws import RobTarget
 
         query = f"tool={tool}&wobj={wobj}&coordinate={coordinate}"
-        told = self._first(f"{_UNITS}/{mechunit}/robtarget?{query}")
+        reported = self._first(f"{_UNITS}/{mechunit}/robtarget?{query}")
         return RobTarget(
-            _numbers(told, list("xyz")),
-            _numbers(told, [f"q{i}" for i in range(1, 5)]),
-            _numbers(told, ["cf1", "cf4", "cf6", "cfx"]),
-            _numbers(told, [f"eax{letter}" for letter in "abcdef"]),
+            _numbers(reported, list("xyz")),
+            _numbers(reported, [f"q{i}" for i in range(1, 5)]),
+            _numbers(reported, ["cf1", "cf4", "cf6", "cfx"]),
+            _numbers(reported, [f"eax{letter}" for letter in "abcdef"]),
         )
 
     # ---- data, files, log --------------------------------------------------------------------
@@ -148,15 +148,15 @@ class Rws2:
 
         return [
             EventLogEntry(
-                int(str(told["_title"]).rpartition("/")[2]),
-                int(told["msgtype"]),
-                int(told["code"]),
+                int(str(reported["_title"]).rpartition("/")[2]),
+                int(reported["msgtype"]),
+                int(reported["code"]),
                 None,
-                [str(argument["value"]) for argument in told.get("argv", [])],
-                *(str(told.get(key, "")) for key in ("title", "desc", "conseqs", "causes")),
-                str(told.get("actions", "")),
+                [str(argument["value"]) for argument in reported.get("argv", [])],
+                *(str(reported.get(key, "")) for key in ("title", "desc", "conseqs", "causes")),
+                str(reported.get("actions", "")),
             )
-            for told in self._states(f"rw/elog/{elog}?lang=en")
+            for reported in self._states(f"rw/elog/{elog}?lang=en")
         ]
 
     def close(self) -> None:
@@ -189,10 +189,10 @@ class Rws2:
         return states[0]
 
     def _states(self, path: str) -> list[dict[str, Any]]:
-        told = self._ask("GET", path, headers=_HEADERS)
-        embedded = told.get("_embedded")
+        reported = self._ask("GET", path, headers=_HEADERS)
+        embedded = reported.get("_embedded")
         listed = embedded.get("resources") if isinstance(embedded, dict) else None
-        found = told.get("state") or listed
+        found = reported.get("state") or listed
         return [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
 
     def _post(self, path: str, payload: dict[str, str]) -> None:
@@ -200,22 +200,22 @@ class Rws2:
 
     def _ask(self, method: str, path: str, **more: Any) -> dict[str, Any]:
         answer = self._session.request(method, f"{self._url}/{path}", **more)
-        told = {} if answer.status_code == _NO_CONTENT or not answer.content else _json(answer)
+        reported = {} if answer.status_code == _NO_CONTENT or not answer.content else _json(answer)
         if answer.status_code >= _REFUSED:
-            status = told.get("status")
+            status = reported.get("status")
             said = status if isinstance(status, dict) else {}
             code = -1 if answer.status_code == 401 else int(said.get("code", answer.status_code))
             raise Rws2Refused(str(said.get("msg", f"HTTP status {answer.status_code}")), code)
-        return told
+        return reported
 
 
 def _json(answer: Any) -> dict[str, Any]:
     try:
-        told = answer.json()
+        reported = answer.json()
     except (ValueError, RecursionError):
-        told = None
-    return told if isinstance(told, dict) else {}
+        reported = None
+    return reported if isinstance(reported, dict) else {}
 
 
-def _numbers(told: dict[str, Any], names: list[str]) -> Any:
-    return np.array([told[name] for name in names], dtype=np.float64)
+def _numbers(reported: dict[str, Any], names: list[str]) -> Any:
+    return np.array([reported[name] for name in names], dtype=np.float64)

@@ -70,7 +70,7 @@ class Stopper:
             # an interrupt typed at the terminal must not take the guard along
             start_new_session=True,
         )
-        self._tell_guard(self._login)
+        self._order_guard(self._login)
         self._await_guard(self._guard)
         self._thread.start()
 
@@ -82,7 +82,7 @@ class Stopper:
         self.failure = None
         self._answered.clear()
         self._motors_off = motors_off
-        self._tell_guard(MOTORS_OFF if motors_off else STOP)
+        self._order_guard(MOTORS_OFF if motors_off else STOP)
         self._asked.set()
         return self._answered.wait(_ANSWER_S)
 
@@ -115,7 +115,7 @@ class Stopper:
                 "could not log in. Nothing moves without it"
             )
 
-    def _tell_guard(self, line: str) -> None:
+    def _order_guard(self, line: str) -> None:
         if self._guard is not None and self._guard.stdin is not None:
             with contextlib.suppress(OSError, ValueError):
                 self._guard.stdin.write(line + "\n")

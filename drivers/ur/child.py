@@ -37,9 +37,9 @@ def main() -> None:
         if not control.setWatchdog(options["watchdog_hz"]):
             raise RuntimeError("the controller's watchdog could not be set")
     except Exception as error:
-        _tell(events, "failed", why=str(error))
+        _emit(events, "failed", why=str(error))
         os._exit(1)
-    _tell(events, "ready")
+    _emit(events, "ready")
     try:
         _serve(control, events, options["silence_s"])
     finally:
@@ -61,7 +61,7 @@ def _claim_stdout() -> TextIO:
     return events
 
 
-def _tell(events: TextIO, event: str, **more: Any) -> None:
+def _emit(events: TextIO, event: str, **more: Any) -> None:
     events.write(json.dumps({"event": event, **more}) + "\n")
 
 
@@ -79,7 +79,7 @@ def _serve(control: Any, events: TextIO, silence_s: float) -> None:
             for line in filter(None, lines):
                 before = _obey(control, events, json.loads(line), before)
         if not control.kickWatchdog():
-            _tell(events, "failed", why="the watchdog could not be kicked: link to the arm lost")
+            _emit(events, "failed", why="the watchdog could not be kicked: link to the arm lost")
             return
         before = _progress(control, events, before)
 
@@ -90,9 +90,9 @@ def _obey(control: Any, events: TextIO, order: dict[str, Any], before: int | Non
     operation = control.getAsyncOperationProgressEx().operationId()
     move = control.moveJ if order["order"] == "move_j" else control.moveL
     if not move(order["target"], order["speed"], order["acceleration"], True):
-        _tell(events, "failed", why="the controller did not take the motion")
+        _emit(events, "failed", why="the controller did not take the motion")
         return None
-    _tell(events, "moving")
+    _emit(events, "moving")
     return int(operation)
 
 
@@ -103,7 +103,7 @@ def _progress(control: Any, events: TextIO, before: int | None) -> int | None:
     status = control.getAsyncOperationProgressEx()
     if status.isAsyncOperationRunning() or status.operationId() == before:
         return before
-    _tell(events, "done")
+    _emit(events, "done")
     return None
 
 

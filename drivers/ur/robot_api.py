@@ -59,7 +59,7 @@ class RobotApi:
 
     def identity(self) -> dict[str, str]:
         """Version, model and serial number, as far as the controller tells them."""
-        told = {"robot_api": self.version()}
+        reported = {"robot_api": self.version()}
         places = {
             "polyscope": ("/versions/v1", "marketingVersion"),
             "model": ("/system/v1/information", "robotType"),
@@ -68,8 +68,8 @@ class RobotApi:
         for name, (path, key) in places.items():
             value = self._get(path).get(key)
             if isinstance(value, str):
-                told[name] = printable(value)
-        return told
+                reported[name] = printable(value)
+        return reported
 
     def in_local_mode(self) -> bool:
         """Whether programs from outside are ignored; False where the controller cannot say."""
@@ -111,12 +111,12 @@ class RobotApi:
 
     def _get(self, path: str) -> dict[str, Any]:
         """The answer to a question; empty where this version does not know it."""
-        status, told = self._ask("GET", path)
-        return told if status in _OK else {}
+        status, reported = self._ask("GET", path)
+        return reported if status in _OK else {}
 
     def _put(self, path: str, action: str) -> str | None:
         """Order something; return None, or why it is refused."""
-        status, told = self._ask("PUT", path, json.dumps({"action": action}))
+        status, reported = self._ask("PUT", path, json.dumps({"action": action}))
         if status in _OK:
             return None
         if status == _FORBIDDEN:
@@ -124,7 +124,7 @@ class RobotApi:
                 f"UR controller {self._host}: refuses '{action}' in local mode: switch to Remote "
                 "on the safety screen of the teach pendant (in automatic mode)"
             )
-        said = " ".join(str(told[key]) for key in ("message", "details") if told.get(key))
+        said = " ".join(str(reported[key]) for key in ("message", "details") if reported.get(key))
         return printable(said) or f"HTTP status {status}"
 
     def _ask(self, verb: str, path: str, body: str | None = None) -> tuple[int, dict[str, Any]]:
@@ -140,7 +140,7 @@ class RobotApi:
                     f"answer ({error}). Check power, cable and address"
                 ) from None
         try:
-            told = json.loads(answer) if answer else {}
+            reported = json.loads(answer) if answer else {}
         except (ValueError, RecursionError):
-            told = {}
-        return status, told if isinstance(told, dict) else {}
+            reported = {}
+        return status, reported if isinstance(reported, dict) else {}

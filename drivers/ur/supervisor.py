@@ -72,7 +72,7 @@ class Supervisor:
         self._stop_s: float | None = None
         self._resent_s = 0.0
         self.fault: str | None = None
-        self._told = False
+        self._cause_known = False
         self._tripped_s = 0.0
         self.stop_failed: str | None = None
         self._thread = threading.Thread(target=self._run, name="ur-supervisor", daemon=True)
@@ -115,11 +115,11 @@ class Supervisor:
         """Forget a fault that the operator has mended."""
         with self._lock:
             self.fault = self.stop_failed = None
-            self._told = False
+            self._cause_known = False
 
     def why(self) -> str | None:
         """The fault in its own words: of a stop just ordered, a packet soon tells the cause."""
-        while self.fault and not self._told and time.monotonic() - self._tripped_s < _WHY_S:
+        while self.fault and not self._cause_known and time.monotonic() - self._tripped_s < _WHY_S:
             time.sleep(_CYCLE_S)
         return self.fault
 
@@ -169,12 +169,15 @@ class Supervisor:
                 self._trip(f"the driver's supervision failed: {error!r}")
 
     def _watch(self, packet: Packet) -> None:
-        told = fault_in(packet)
-        fault = told or self._remote.fault or self._program.fault(self._child, packet)
+        reported = fault_in(packet)
+        fault = reported or self._remote.fault or self._program.fault(self._child, packet)
         if fault is not None:
             self._trip(fault)
         # the child may notice before the packet comes that tells why
-        self.fault, self._told = told or self.fault, self._told or told is not None
+        self.fault, self._cause_known = (
+            reported or self.fault,
+            self._cause_known or reported is not None,
+        )
         self._see_stop_through(packet)
         if self.fault is None and self._stop_s is None:
             self._drive(packet)

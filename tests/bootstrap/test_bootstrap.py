@@ -17,8 +17,8 @@ from cell.storage.files.parts import Box, Pose
 from cell.storage.files.plan_file import read_plan
 from cell.storage.files.writing import yaml_text
 from cell.storage.recording import read_recording
-from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
-from cell.verbs.bootstrap.near_guard import NearGuard, carried_doubt_m
+from cell.verbs.bootstrap import Bootstrap, LayoutUncertainty
+from cell.verbs.bootstrap.near_guard import NearGuard, carried_uncertainty_m
 from drivers.arm import ArmState
 from drivers.errors import SafetyError, StopFailed
 from sim.arm import SimArm
@@ -68,7 +68,7 @@ def moved(task: Bootstrap, start_deg: tuple[float, ...] | None = None):  # type:
 
 
 def test_without_a_board_nothing_moves(tmp_path: Path) -> None:
-    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
+    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutUncertainty())
     devices, done = moved(task, (31, -77, -110, -10, 10, 17))
     assert done.result.finish is Finish.GIVEN_UP
     assert "board not found" in done.result.reason
@@ -77,7 +77,7 @@ def test_without_a_board_nothing_moves(tmp_path: Path) -> None:
 
 
 def test_an_arm_that_somebody_moves_is_not_taken_over(tmp_path: Path) -> None:
-    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
+    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutUncertainty())
     devices = task.devices(dry_run=True)
     read = devices.arm.state
 
@@ -93,7 +93,7 @@ def test_an_arm_that_somebody_moves_is_not_taken_over(tmp_path: Path) -> None:
 
 
 def test_an_arm_of_another_model_is_not_moved(tmp_path: Path) -> None:
-    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
+    task = Bootstrap.of(written(ur3(), tmp_path), tmp_path / "run", tmp_path, LayoutUncertainty())
     devices = task.devices(dry_run=True)
     other = task.cell.model_copy(
         update={
@@ -125,7 +125,7 @@ def test_a_layout_wrong_beyond_what_is_told_ends_the_moves(
     turn: Rotation, says: str, most_moves: int, tmp_path: Path
 ) -> None:
     path = written(with_mounted(ur3(), turn), tmp_path)
-    task = Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt())
+    task = Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutUncertainty())
     devices, done = moved(task)
     assert done.result.finish is Finish.BAD_INPUT
     assert says in done.result.reason
@@ -137,25 +137,25 @@ def test_a_box_that_the_layout_may_reach_stops_it_before_the_first_move(tmp_path
     assert cell.workspace is not None
     low = cell.workspace.model_copy(update={"high_m": (0.6, 0.5, 0.42)})
     path = written(cell.model_copy(update={"workspace": low}), tmp_path)
-    task = Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt())
+    task = Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutUncertainty())
     with pytest.raises(SafetyError, match=r"would leave the workspace.*drive the arm away"):
         moved(task)
     assert not (tmp_path / "run").exists()
 
 
 def test_boxes_grow_by_what_may_be_off() -> None:
-    told = LayoutDoubt(mount_m=0.04, mount_rad=0.1)
-    assert carried_doubt_m(ur3(), told) == pytest.approx(0.04)
+    uncertainty = LayoutUncertainty(mount_m=0.04, mount_rad=0.1)
+    assert carried_uncertainty_m(ur3(), uncertainty) == pytest.approx(0.04)
     corner_m = np.hypot(0.16, 0.12)
-    beside = carried_doubt_m(eye_to_hand(), told)
+    beside = carried_uncertainty_m(eye_to_hand(), uncertainty)
     assert beside == pytest.approx(0.04 + 0.1 * corner_m, abs=1e-3)
     with pytest.raises(InputError, match="nothing is left of it"):
-        carried_doubt_m(ur3(), LayoutDoubt(mount_m=0.6))
+        carried_uncertainty_m(ur3(), LayoutUncertainty(mount_m=0.6))
 
 
 def test_what_hangs_on_the_flange_is_held_against_boxes_by_what_it_may_be_off() -> None:
     start = np.radians([31.0, -77, -128, -10, 63, 17])
-    sure = NearGuard.around(ur3(), start, LayoutDoubt(mount_m=0.0, mount_rad=0.0))
+    sure = NearGuard.around(ur3(), start, LayoutUncertainty(mount_m=0.0, mount_rad=0.0))
     camera_m = sure.kinematics.forward(start)[:3, 3]
     low_m, high_m = (
         camera_m + np.array([0.1, -0.02, -0.02]),
@@ -163,14 +163,14 @@ def test_what_hangs_on_the_flange_is_held_against_boxes_by_what_it_may_be_off() 
     )
     ahead = Box(name="ahead", low_m=tuple(low_m.tolist()), high_m=tuple(high_m.tolist()))
     sure.with_box(ahead).check_surroundings()
-    doubtful = NearGuard.around(ur3(), start, LayoutDoubt(mount_m=0.1, mount_rad=0.0))
+    doubtful = NearGuard.around(ur3(), start, LayoutUncertainty(mount_m=0.1, mount_rad=0.0))
     with pytest.raises(SafetyError, match=r"\(it may be 0.10 m off\) would strike"):
         doubtful.with_box(ahead).check_surroundings()
 
 
 def test_a_guard_keeps_near(tmp_path: Path) -> None:
     start = np.radians([31.0, -77, -128, -10, 63, 17])
-    guard = NearGuard.around(ur3(), start, LayoutDoubt())
+    guard = NearGuard.around(ur3(), start, LayoutUncertainty())
     guard.check_move(start, start + np.radians([0, 0, 0, 0, 10, 0]), "little")
     with pytest.raises(SafetyError, match="a bootstrap stays within 150 mm and 25°"):
         guard.check_move(start, start + np.radians([0, 0, 0, 0, 0, 30]), "far")
@@ -182,7 +182,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     path = written(ur3(), tmp_path)
     (tmp_path / "some.found.yaml").write_text("mine")
     with pytest.raises(InputError, match="is there already and is not overwritten"):
-        Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt())
+        Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutUncertainty())
 
 
 def test_start_angles_are_checked(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from scipy.spatial.transform import RigidTransform
 
 from calib.chain.kinematics import arm
 from cell.storage.files.cell_file import CellFile
-from cell.verbs.bootstrap import LayoutDoubt
+from cell.verbs.bootstrap import LayoutUncertainty
 from cell.verbs.bootstrap.guide import BootstrapGuide
 from cell.verbs.bootstrap.near_guard import NearGuard
 from tests.bootstrap.trials import Wrong, eye_to_hand, frame_of, run_on_corners, worn_out
@@ -17,7 +17,7 @@ def guide_at_home(cell: CellFile) -> BootstrapGuide:
     assert cell.layout is not None
     start = np.radians(cell.layout.home_deg)
     guide = BootstrapGuide(
-        cell, cell.layout, NearGuard.around(cell, start, LayoutDoubt()), LayoutDoubt()
+        cell, cell.layout, NearGuard.around(cell, start, LayoutUncertainty()), LayoutUncertainty()
     )
     guide.checked(frame_of(cell, start, 0, np.random.default_rng(0)))
     return guide

@@ -11,8 +11,8 @@ from cell.errors import BadAnswer, InputError
 from cell.sequencer.states import Finish
 from cell.storage.files.cell_file import CellFile
 from cell.storage.files.writing import yaml_text
-from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
-from cell.verbs.bootstrap.near_guard import carried_doubt_m
+from cell.verbs.bootstrap import Bootstrap, LayoutUncertainty
+from cell.verbs.bootstrap.near_guard import carried_uncertainty_m
 from sim.arm import SimArm
 from tests.bootstrap.trials import eye_to_hand, run_trial, ur3
 
@@ -53,13 +53,15 @@ def written(cell: CellFile, folder: Path) -> Path:
 
 def test_a_mount_of_the_wrong_kind_is_found_by_the_shifts(tmp_path: Path) -> None:
     unknown, start_deg = without_layout(ur3(), 3.8)
-    right = Bootstrap.of(written(unknown, tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
+    right = Bootstrap.of(
+        written(unknown, tmp_path), tmp_path / "run", tmp_path, LayoutUncertainty()
+    )
     devices = right.devices(dry_run=True, start_deg=start_deg)
     mistaken = unknown.model_copy(
         update={"mount": "eye_to_hand", "workspace": None, "keep_out": ()}
     )
     path = written(mistaken, tmp_path)
-    done = Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt()).run(
+    done = Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutUncertainty()).run(
         devices, simulated=True
     )
     assert done.result.finish is Finish.BAD_INPUT
@@ -70,8 +72,8 @@ def test_a_mount_of_the_wrong_kind_is_found_by_the_shifts(tmp_path: Path) -> Non
 
 def test_without_a_layout_whatever_is_at_the_flange_may_point_anywhere() -> None:
     unknown, _ = without_layout(eye_to_hand(), 4.7)
-    doubt_m = carried_doubt_m(unknown, LayoutDoubt(reach_m=0.1))
-    assert doubt_m == pytest.approx(0.1 + np.hypot(0.16, 0.12), abs=1e-9)
+    uncertainty_m = carried_uncertainty_m(unknown, LayoutUncertainty(reach_m=0.1))
+    assert uncertainty_m == pytest.approx(0.1 + np.hypot(0.16, 0.12), abs=1e-9)
 
 
 def test_what_is_lacking_is_said_before_anything_moves(tmp_path: Path) -> None:
@@ -79,7 +81,7 @@ def test_what_is_lacking_is_said_before_anything_moves(tmp_path: Path) -> None:
     no_pixel = unknown.camera.model_copy(update={"pixel_size_um": None})
     path = written(unknown.model_copy(update={"camera": no_pixel}), tmp_path)
     with pytest.raises(InputError, match=r"camera\.lens\.focal_length_mm and camera\.pixel_size"):
-        Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutDoubt())
-    task = Bootstrap.of(written(unknown, tmp_path), tmp_path / "run", tmp_path, LayoutDoubt())
+        Bootstrap.of(path, tmp_path / "run", tmp_path, LayoutUncertainty())
+    task = Bootstrap.of(written(unknown, tmp_path), tmp_path / "run", tmp_path, LayoutUncertainty())
     with pytest.raises(InputError, match="say with --start-deg"):
         task.devices(dry_run=True)

@@ -26,7 +26,7 @@ from cell.storage.files.parts import Pose
 from cell.storage.files.plan_file import PlanFile, read_plan
 from cell.storage.files.writing import yaml_text
 from cell.storage.recording import FrameRecord, read_recording
-from cell.verbs.bootstrap import Bootstrap, LayoutDoubt
+from cell.verbs.bootstrap import Bootstrap, LayoutUncertainty
 from cell.verbs.bootstrap.found import Found
 from cell.verbs.bootstrap.guide import BootstrapGuide
 from cell.verbs.bootstrap.near_guard import FARTHEST_M, FARTHEST_RAD, TRAVEL_RAD, NearGuard
@@ -240,7 +240,7 @@ def run_trial(cell: CellFile, folder: Path, start_deg: tuple[float, ...] | None 
     folder.mkdir(parents=True)
     path = folder / f"{cell.name}.cell.yaml"
     path.write_text(yaml_text(cell.as_mapping()))
-    task = Bootstrap.of(path, folder / "run", folder, LayoutDoubt())
+    task = Bootstrap.of(path, folder / "run", folder, LayoutUncertainty())
     done = task.run(task.devices(dry_run=True, start_deg=start_deg), simulated=True)
     frames = read_recording(task.recording).frames
     stops = np.array([frame.joints_rad for frame in frames])
@@ -257,11 +257,11 @@ def run_on_corners(
     """Bootstrap a cell without pictures: the true cell's corners go straight to the guide."""
     assert cell.layout is not None
     start = np.radians(cell.layout.home_deg if start_deg is None else start_deg)
-    guard = NearGuard.around(cell, start, LayoutDoubt())
+    guard = NearGuard.around(cell, start, LayoutUncertainty())
     stops = [start]
     try:
         guard.check_surroundings()
-        guide = BootstrapGuide(cell, cell.layout, guard, LayoutDoubt())
+        guide = BootstrapGuide(cell, cell.layout, guard, LayoutUncertainty())
         guide.checked(frame_of(cell, start, 0, rng))
         while (view := guide.next_view()) is not None:
             stops.append(np.array(view.joints()))

@@ -219,12 +219,12 @@ def test_the_joint_fit_tells_its_own_focus_with_its_covariance(lens: str) -> Non
     joint = found.solutions["joint_ml"]
     assert joint.focus is not None
     assert joint.covariance is not None
-    told = {name: p.value for name, p in joint.focus.parameters.items()}
+    reported = {name: p.value for name, p in joint.focus.parameters.items()}
     far, bend = ("alpha0_px", "k_px_m2") if lens == "inverse_square" else ("alpha_inf_px", "f_m")
-    assert told[far] == pytest.approx(ALPHA0, abs=2.0)
+    assert reported[far] == pytest.approx(ALPHA0, abs=2.0)
     (truth,) = LENSES[lens].values()
     sigma = joint.focus.parameters[bend].sigma
-    assert abs(told[bend] - truth) < 4 * sigma
+    assert abs(reported[bend] - truth) < 4 * sigma
     at = joint.covariance.names.index(bend)
     assert joint.covariance.matrix[at, at] == pytest.approx(sigma**2)
     names = as_mapping(found, "bench")["solutions"]["joint_ml"]["covariance"]["names"]

@@ -73,9 +73,9 @@ def test_a_focal_length_known_to_a_few_percent_is_not_determined() -> None:
     found = calibrate(VIEWS.take(np.array([5, 7, 9])))
     name = "zhang_mle_no_skew"
     loose = replace(found.solutions[name], sigma={"alpha_px": 150.0})
-    told = cautions(VIEWS, {name: loose}, None, None, (), None)
-    assert [caution.undetermined for caution in told] == [("camera",)]
-    assert "the board tilted by 20 to 45 degrees" in told[0].remedy
+    reported = cautions(VIEWS, {name: loose}, None, None, (), None)
+    assert [caution.undetermined for caution in reported] == [("camera",)]
+    assert "the board tilted by 20 to 45 degrees" in reported[0].remedy
 
 
 def test_views_square_to_the_board_are_no_calibration_at_all() -> None:
@@ -168,9 +168,9 @@ def test_the_verb_says_it_exits_1_and_export_refuses(
         monkeypatch.setattr(sys, "argv", ["cell", *words])
         with pytest.raises(SystemExit) as left:
             main()
-        told = capsys.readouterr()
+        reported = capsys.readouterr()
         code = left.value.code
-        return (code if isinstance(code, int) else 0), told.out, told.err
+        return (code if isinstance(code, int) else 0), reported.out, reported.err
 
     status, out, err = cell("calibrate", str(folder), "-o", str(tmp_path / "out"), "--json")
     content = json.loads(out)

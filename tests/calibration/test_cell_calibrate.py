@@ -112,7 +112,7 @@ def test_corners_far_off_stand_in_the_file_and_in_the_report(tmp_path: Path) -> 
     folder = _write(tmp_path / "bench", replace(views, corners_px=corners))
     _, out = calibrate_into(read_recording(folder), tmp_path / "out")
     content = json.loads((out / "calibration.json").read_text())
-    told = {one["frame"]: one["corners"] for one in content["corners_left_out"]}
-    assert told == {4: [10, 33], 8: [2]}
+    reported = {one["frame"]: one["corners"] for one in content["corners_left_out"]}
+    assert reported == {4: [10, 33], 8: [2]}
     report = (out / "report.html").read_text()
     assert "3 corners lie far from the board and had no say (frames 4, 8)" in report

@@ -81,8 +81,10 @@ def test_the_folds_move_by_what_is_stated_and_the_frames_held_out_miss_by_it() -
 
 def test_noise_levels_that_are_too_small_are_called_so() -> None:
     joint, views = fitted(2)
-    told = joint.noise
-    small = replace(joint, noise=Noise(told.corner_px, told.flange_m / 2, told.flange_rad / 2))
+    reported = joint.noise
+    small = replace(
+        joint, noise=Noise(reported.corner_px, reported.flange_m / 2, reported.flange_rad / 2)
+    )
     found = cross_validate(small, views, SPAN_M)
     assert found.verdict == "sigma_too_small"
     assert 2.5 < found.held_out.robot.each < 4.5
@@ -169,11 +171,11 @@ def test_a_fit_that_does_not_come_to_rest_is_no_witness(monkeypatch: pytest.Monk
 def test_the_file_tells_it_all() -> None:
     found = calibrate(mixed_scene(noise_px=0.1, robot_mm=0.03, robot_deg=0.003).views)
     content = CalibrationFile.model_validate(as_mapping(found, "bench"))
-    told, kept = content.cross_validation, found.cross_validation
-    assert told is not None
+    reported, kept = content.cross_validation, found.cross_validation
+    assert reported is not None
     assert kept is not None
-    assert sorted(f for fold in told.folds for f in fold) == list(content.frames_used)
-    assert told.verdict == kept.verdict
-    low, high = told.held_out.expected_band_px
-    assert low < told.held_out.expected_px < high
-    assert {e.quantity for e in told.estimates} >= {"alpha_px", "principal_point_px"}
+    assert sorted(f for fold in reported.folds for f in fold) == list(content.frames_used)
+    assert reported.verdict == kept.verdict
+    low, high = reported.held_out.expected_band_px
+    assert low < reported.held_out.expected_px < high
+    assert {e.quantity for e in reported.estimates} >= {"alpha_px", "principal_point_px"}

@@ -57,12 +57,12 @@ def test_everything_wrong_is_found_and_told_and_nothing_else(mount: Mount) -> No
     assert [r["frame"] for r in content["frames_rejected"]] == [MIRRORED]
     assert "wrong detection" in content["frames_rejected"][0]["reason"]
     assert content["robot"]["outliers"] == [TURNED, OTHERS_POSE]
-    told = np.zeros_like(wrong)
+    reported = np.zeros_like(wrong)
     for one in content["corners_left_out"]:
-        told[one["frame"], one["corners"]] = True
+        reported[one["frame"], one["corners"]] = True
     wrong[MIRRORED] = False
-    assert told[wrong].all()
-    assert not told[~wrong].any()
+    assert reported[wrong].all()
+    assert not reported[~wrong].any()
 
 
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from calib.calibration.roughly_known import (
-    FRAMES_TELL_NOISE,
-    Doubt,
+    FRAMES_FOR_NOISE,
+    GuessSigma,
     fit_roughly_known,
     guess_from_one_view,
     with_sigma,
@@ -20,7 +20,7 @@ from calib.solver.joint import JointFit
 from calib.views import Mount, Views
 from tests.paper.scene import ALPHA0, FLANGE_FROM_MOUNTED, mixed_scene
 
-DOUBT = Doubt(mounted_m=0.025, mounted_rad=float(np.radians(5.0)), alpha_share=0.1)
+DOUBT = GuessSigma(mounted_m=0.025, mounted_rad=float(np.radians(5.0)), alpha_share=0.1)
 
 
 @cache
@@ -45,7 +45,7 @@ def test_one_view_leaves_the_mount_as_open_as_it_was_told() -> None:
 
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
 def test_a_few_views_find_what_was_wrong_by_centimetres(mount: Mount) -> None:
-    fit = fitted(FRAMES_TELL_NOISE + 4, mount)
+    fit = fitted(FRAMES_FOR_NOISE + 4, mount)
     off = rigid.to_vector(rigid.inverse(FLANGE_FROM_MOUNTED) @ fit.model.flange_from_mounted)
     assert np.abs(off[:3]).max() < 1e-3
     assert np.abs(off[3:]).max() < np.radians(0.1)

@@ -44,7 +44,7 @@ class FakeArm:
         self.fault: str | None = None
         self.stop_error: Exception | None = None
         self.drift_rad = 0.0
-        self.tells_every_s = 0.0
+        self.reports_every_s = 0.0
         self.obeys_after_s = 0.0
         """From the first order to the brake; inf for an arm that takes it and drives on."""
         self.brakes_s = np.inf
@@ -53,8 +53,8 @@ class FakeArm:
         self.calls.append("connect")
 
     @property
-    def told_s(self) -> float:
-        every = self.tells_every_s
+    def reported_s(self) -> float:
+        every = self.reports_every_s
         return self.now() // every * every if every else self.now()
 
     @property
@@ -70,7 +70,7 @@ class FakeArm:
         joints = self.start + self.share * (self.end - self.start) + self.drift_rad
         motion = Motion.MOVING if self.moving else Motion.STEADY
         return ArmState(
-            host_t_s=self.told_s,
+            host_t_s=self.reported_s,
             controller_t_s=None,
             joints_rad=tuple(joints.tolist()),
             joint_velocity_rad_s=(0.0,) * 6,

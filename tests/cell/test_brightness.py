@@ -20,7 +20,9 @@ def test_light_that_falls_with_distance_is_told_and_scatter_is_not():
     rng = np.random.default_rng(3)
     distance_m = rng.uniform(0.3, 1.0, 30)
     scatter = rng.normal(0, 0.01, 30)
-    (told,) = _trend(0.6 * (1 - 0.2 * (distance_m - 0.3)) + scatter, distance_m, "with distance")
-    assert "-1" in told
-    assert told.endswith("% with distance")
+    (reported,) = _trend(
+        0.6 * (1 - 0.2 * (distance_m - 0.3)) + scatter, distance_m, "with distance"
+    )
+    assert "-1" in reported
+    assert reported.endswith("% with distance")
     assert _trend(0.6 + scatter, distance_m, "with distance") == ()

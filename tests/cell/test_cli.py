@@ -84,11 +84,11 @@ def test_a_plan_is_designed_and_simulated(cell: Cell, tmp_path: Path) -> None:
     words = ("--parallel", "4", "--varied", "6", "--json")
     said = cell("plan", tmp_path / "ur3-robotiq.cell.yaml", *words)
     assert said.status == 0, said.err
-    told = json.loads(said.out)
-    assert (told["views"], told["parallel"] + told["varied"]) == (10, 10)
-    assert 0.05 < max(told["expected"]["alpha_sigma_px"]) < 1.0
-    assert 10 < told["expected"]["duration"]["whole_s"] < 120
-    assert told["effects"]["joint_zero_offset"] < 1.0
+    reported = json.loads(said.out)
+    assert (reported["views"], reported["parallel"] + reported["varied"]) == (10, 10)
+    assert 0.05 < max(reported["expected"]["alpha_sigma_px"]) < 1.0
+    assert 10 < reported["expected"]["duration"]["whole_s"] < 120
+    assert reported["effects"]["joint_zero_offset"] < 1.0
     made = tmp_path / "ur3-robotiq.plan.yaml"
     assert cell("plan", tmp_path / "ur3-robotiq.cell.yaml").status == 2
     said = cell("simulate", made, "-o", tmp_path / "r", "--json", "--seed", "5")

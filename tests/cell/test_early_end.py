@@ -233,7 +233,7 @@ class StopAfter(Watcher):
     def __init__(self, frames: int, stop: StopRequest) -> None:
         self.frames, self.stop = frames, stop
 
-    def told(self, status: Status) -> None:
+    def status_changed(self, status: Status) -> None:
         if status.done == self.frames and status.state is State.SETTLING:
             self.stop.ask("the test")
 
@@ -255,9 +255,9 @@ def test_a_run_gone_on_with_is_judged_by_the_pictures_of_before(tmp_path: Path) 
     words = ["run", str(path), "--dry-run", "--record-only", "--json", "--resume"]
     said = CliRunner().invoke(app, [*words, "-o", str(tmp_path / "run")])
     assert said.exit_code == 0, said.output
-    told = json.loads(said.stdout)
-    assert (told["finish"], told["frames"]) == ("completed", stopped.frames)
-    assert told["ended_early"].startswith("alpha is known to 0.")
+    status_changed = json.loads(said.stdout)
+    assert (status_changed["finish"], status_changed["frames"]) == ("completed", stopped.frames)
+    assert status_changed["ended_early"].startswith("alpha is known to 0.")
     assert "ending early: alpha is known" in said.stderr
 
 

@@ -176,11 +176,11 @@ def test_joint_angles_become_poses_by_the_arms_kinematics(tmp_path: Path) -> Non
     source = pictures(tmp_path / "source")
     angles = np.array([[0.5, -1.3, -2.2, -0.2, 1.1, 0.3], [0.3, -1.8, -1.7, -0.1, 1.3, 0.2]])
     ros = ["elbow", "shoulder_lift", "shoulder_pan", "wrist_1", "wrist_2", "wrist_3"]
-    told = {
+    reported = {
         "joint_names": [f"{name}_joint" for name in ros],
         "joint_values": angles[:, [2, 1, 0, 3, 4, 5]].tolist(),
     }
-    (tmp_path / "joints.yaml").write_text(json.dumps(told))
+    (tmp_path / "joints.yaml").write_text(json.dumps(reported))
     said = Described(board=BOARD, joints=tmp_path / "joints.yaml", robot="ur3")
     import_source(source, tmp_path / "r", said)
     views = read_recording(tmp_path / "r").views()

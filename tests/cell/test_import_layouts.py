@@ -75,9 +75,9 @@ def test_a_layout_is_understood_and_said_aloud(tmp_path: Path, name: str) -> Non
     tolerance = 1e-3 * layout.digits_mm
     np.testing.assert_allclose(found[:, :3, 3], FLANGE[:, :3, 3], atol=tolerance)
     np.testing.assert_allclose(found[:, :3, :3], FLANGE[:, :3, :3], atol=3e-6)
-    told = " ".join(convention.guessed)
+    reported = " ".join(convention.guessed)
     for words in ("positions are in", "are paired", "bear this out"):
-        assert words in told
+        assert words in reported
     assert not convention.contradicted
 
 

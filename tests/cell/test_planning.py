@@ -78,12 +78,12 @@ def test_the_plans_that_come_along_are_as_good_as_what_the_planner_makes(name: s
     assert [kind.count("parallel") for kind in kinds] == [kinds[0].count("parallel")] * 2
     assert [len(kind) for kind in kinds] == [40, 40]
     # another processor may round one choice among near equals differently
-    told, kept = (
+    reported, kept = (
         expected_from(Plan(stored.path, plan, stored.cell)) for plan in (made, stored.file)
     )
-    np.testing.assert_allclose(told.alpha_sigma_px, kept.alpha_sigma_px, rtol=0.05)
-    np.testing.assert_allclose(told.projection_sigma_px, kept.projection_sigma_px, rtol=0.05)
-    assert told.duration.whole_s == pytest.approx(kept.duration.whole_s, rel=0.2)
+    np.testing.assert_allclose(reported.alpha_sigma_px, kept.alpha_sigma_px, rtol=0.05)
+    np.testing.assert_allclose(reported.projection_sigma_px, kept.projection_sigma_px, rtol=0.05)
+    assert reported.duration.whole_s == pytest.approx(kept.duration.whole_s, rel=0.2)
 
 
 @cache
@@ -174,13 +174,17 @@ def test_views_keep_out_of_the_boxes_and_the_plan_says_what_it_promises() -> Non
     plan = Plan(Path("made.plan.yaml"), design_plan(cell, PlanSize(3, 9)), cell)
     guard = Guard.of(plan)
     assert len(guard.check_plan(plan, np.radians(cell.layout.home_deg))) == 12
-    told = expected_from(plan)
-    assert told.noise_from.startswith("assumed")
-    assert (np.diff(told.distance_m) > 0).all()
-    for sigma in (told.alpha_sigma_px, told.projection_sigma_px, told.workpiece_sigma_m):
+    reported = expected_from(plan)
+    assert reported.noise_from.startswith("assumed")
+    assert (np.diff(reported.distance_m) > 0).all()
+    for sigma in (
+        reported.alpha_sigma_px,
+        reported.projection_sigma_px,
+        reported.workpiece_sigma_m,
+    ):
         assert sigma.shape == (4,)
         assert (sigma > 0).all()
-    time = told.duration
+    time = reported.duration
     assert time.whole_s == pytest.approx(
         time.motion_s + time.settle_s + time.focus_s + time.exposure_s
     )

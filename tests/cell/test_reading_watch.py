@@ -143,8 +143,8 @@ def test_a_joint_that_is_faster_than_its_move_is_stopped_though_no_speed_is_told
     bench = Bench(tmp_path, LONG_WAY + wrist + NO_BOARD)
     if clock:
         clocked(bench)
-    told = bench.arm.state
-    bench.arm.state = lambda: replace(told(), joint_velocity_rad_s=None)  # type: ignore
+    reported = bench.arm.state
+    bench.arm.state = lambda: replace(reported(), joint_velocity_rad_s=None)  # type: ignore
     start_move = bench.arm.start_move
 
     def hastily(target):  # type: ignore[no-untyped-def]

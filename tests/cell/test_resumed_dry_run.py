@@ -34,7 +34,7 @@ class StopAfter(Watcher):
     def __init__(self, stop: StopRequest, frames: int) -> None:
         self._stop, self._frames = stop, frames
 
-    def told(self, status: Status) -> None:
+    def status_changed(self, status: Status) -> None:
         if status.done >= self._frames:
             self._stop.ask("the test")
 

@@ -52,7 +52,7 @@ class Listener(Watcher):
         self.statuses: list[Status] = []
         self.frames: list[Checked] = []
 
-    def told(self, status: Status) -> None:
+    def status_changed(self, status: Status) -> None:
         self.statuses.append(status)
 
     def checked(self, checked: Checked) -> None:
@@ -96,7 +96,7 @@ class Bench:
             return sequencer.run()
 
     @property
-    def told(self) -> list[Status]:
+    def statuses(self) -> list[Status]:
         (listener,) = self.watchers
         assert isinstance(listener, Listener)
         return listener.statuses
@@ -131,8 +131,8 @@ def test_every_view_is_logged_with_the_pose_of_its_frame(bench: Bench) -> None:
     times = [frame.t_s for frame in recording.frames]
     assert times == sorted(times)
     assert bench.arm.calls[-1] == bench.camera.calls[-1] == "close"
-    assert [status.state for status in bench.told][-1] is State.FINISHED
-    assert bench.told[-3].left_s is not None
+    assert [status.state for status in bench.statuses][-1] is State.FINISHED
+    assert bench.statuses[-3].left_s is not None
 
 
 def test_a_picture_of_another_size_than_the_cell_file_says_ends_the_run(bench: Bench) -> None:
@@ -260,7 +260,7 @@ def test_a_failing_stop_is_the_loudest_error(
 
 def test_a_terminal_that_is_gone_does_not_end_the_run(bench: Bench) -> None:
     class Gone(Watcher):
-        def told(self, status: Status) -> None:
+        def status_changed(self, status: Status) -> None:
             raise BrokenPipeError
 
     bench.watchers = [Gone()]
@@ -269,7 +269,7 @@ def test_a_terminal_that_is_gone_does_not_end_the_run(bench: Bench) -> None:
     assert ran_through(bench)
 
 
-@pytest.mark.parametrize("call", ["told", "read", "checked"])
+@pytest.mark.parametrize("call", ["status_changed", "read", "checked"])
 def test_a_watcher_that_fails_is_dropped_and_the_others_go_on(bench: Bench, call: str) -> None:
     def fail(seen: object) -> None:
         raise ZeroDivisionError("a bug of the page")
@@ -298,7 +298,7 @@ class WhenAt(Watcher):
     def __init__(self, state: State, index: int, act: Callable[[], None]) -> None:
         self.when, self.act = (state, index), act
 
-    def told(self, status: Status) -> None:
+    def status_changed(self, status: Status) -> None:
         if (status.state, status.index) == self.when:
             self.act()
 
@@ -427,7 +427,7 @@ def test_a_frame_older_than_the_standstill_is_refused(bench: Bench) -> None:
 
 
 def test_an_arm_that_tells_its_pose_seldom_is_waited_for(bench: Bench) -> None:
-    bench.arm.tells_every_s = 0.2
+    bench.arm.reports_every_s = 0.2
     assert bench.run().finish is Finish.COMPLETED
     for frame in read_recording(bench.folder).frames:
         clocks = (frame.model_extra or {})["clocks"]

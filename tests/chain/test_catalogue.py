@@ -111,8 +111,8 @@ def test_an_effect_explains_itself(label: str) -> None:
     assert effect.link in LINKS
     assert effect.physics.endswith(".")
     assert len(effect.physics.split()) >= 6
-    for told in (effect.equation, effect.source, effect.remedy):
-        assert len(told) > 12
+    for reported in (effect.equation, effect.source, effect.remedy):
+        assert len(reported) > 12
     known = {e.name for e in catalogue()}
     assert set(effect.confounded_with) <= known - {effect.name}
     assert any(p.role == "amount" and p.identifiable for p in effect.parameters)
@@ -151,7 +151,7 @@ def test_files_write_effects_by_name_law_and_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "given", "told"),
+    ("name", "given", "reported"),
     [
         ("focus_breething", {}, "focus_breathing"),
         ("focus_breathing", {"k_px_m2": 1.0}, "inverse_square, thin_lens"),
@@ -162,8 +162,8 @@ def test_files_write_effects_by_name_law_and_numbers() -> None:
     ],
 )
 def test_a_wrong_name_is_told_with_those_that_exist(
-    name: str, given: dict[str, float | str], told: str
+    name: str, given: dict[str, float | str], reported: str
 ) -> None:
     with pytest.raises(KeyError) as caught:
         make_effect(name, given)
-    assert told in str(caught.value)
+    assert reported in str(caught.value)

@@ -115,9 +115,9 @@ def test_a_curve_without_a_name_comes_back_from_its_file(site: str, covariate: s
     curve = Present(zero.effect, zero.values + drawn * typical)
     written = {"law": curve.effect.law or "", **curve.as_mapping()}
     again = make_effect("empirical", written)
-    told = predict(model.with_effects([again]), views)
-    assert np.array_equal(told, predict(model.with_effects([curve]), views))
-    assert np.abs(told - predict(model, views)).max() > 1e-3
+    reported = predict(model.with_effects([again]), views)
+    assert np.array_equal(reported, predict(model.with_effects([curve]), views))
+    assert np.abs(reported - predict(model, views)).max() > 1e-3
 
 
 def test_a_periodic_curve_keeps_its_period() -> None:

@@ -134,8 +134,8 @@ def test_an_uncertainty_that_its_own_frames_call_too_small_is_told() -> None:
     notes = " ".join(compare(_calibrated(1), sure).notes)
     assert "new: its own frames ask for up to 2.6 times the uncertainty it states" in notes
     assert not any("own frames" in n for n in compare(_calibrated(1), _calibrated(2)).notes)
-    told = STILL | {"cross_validation": {"verdict": "sigma_too_small", "factor": 2.6}}
-    assert _side(told).too_sure == 2.6
+    reported = STILL | {"cross_validation": {"verdict": "sigma_too_small", "factor": 2.6}}
+    assert _side(reported).too_sure == 2.6
 
 
 def test_without_any_uncertainty_it_does_not_judge() -> None:
@@ -223,9 +223,9 @@ def test_the_verb_takes_files_and_folders_and_speaks_json(tmp_path: Path) -> Non
         (folder / "calibration.json").write_text(_content(seed))
     page = tmp_path / "page.html"
     arguments = ["compare", str(folders[0] / "calibration.json"), str(tmp_path / "two")]
-    told = CliRunner().invoke(app, [*arguments, "-o", str(page)])
-    assert told.exit_code == 0
-    assert "As mounted on the robot (hand-eye included): they agree" in told.stdout
+    reported = CliRunner().invoke(app, [*arguments, "-o", str(page)])
+    assert reported.exit_code == 0
+    assert "As mounted on the robot (hand-eye included): they agree" in reported.stdout
     assert page.stat().st_size > 20_000
     said = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
     assert said["schema"] == "cell.comparison/1"

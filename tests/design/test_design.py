@@ -55,8 +55,8 @@ def test_what_is_expected_is_what_a_fit_of_such_views_tells() -> None:
     expected = expect(plain_cell(), [lens], views, NOISE)
     fit = fit_joint(true, views, unknowns_of(true), NOISE, fixed_noise=True)
     assert [u.name for u in expected.unknowns] == [u.name for u in fit.unknowns]
-    told, found = (np.sqrt(np.diag(e.covariance)) for e in (expected, fit))
-    np.testing.assert_allclose(told, found, rtol=0.1)
+    reported, found = (np.sqrt(np.diag(e.covariance)) for e in (expected, fit))
+    np.testing.assert_allclose(reported, found, rtol=0.1)
 
 
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])

@@ -100,9 +100,13 @@ def test_a_law_is_told_with_its_equation_and_predicts_frames_never_shown():
     found = diagnose(made("linear:principal_point.u_px+v_px/gain_db", seed=4, **numbers))
     assert found.verdict == "unexplained"
     assert found.effects == ()
-    (told,) = found.unexplained_all
-    assert (told.link, told.site, told.covariate) == ("lens", "principal_point", "gain_db")
-    law = told.law
+    (reported,) = found.unexplained_all
+    assert (reported.link, reported.site, reported.covariate) == (
+        "lens",
+        "principal_point",
+        "gain_db",
+    )
+    law = reported.law
     assert law is not None
     assert law.form == "linear"
     assert "gain_db" in law.equation

@@ -105,9 +105,9 @@ def test_a_field_comes_back_from_its_file_and_is_nothing_far_from_its_nodes():
     field = present_field("joints", nodes, weights, 0.5, 0.9)
     again = make_effect("empirical", {"law": field.effect.law or "", **field.as_mapping()})
     model = plain_cell()
-    told = predict(model.with_effects([again]), LOG)
-    np.testing.assert_array_equal(told, predict(model.with_effects([field]), LOG))
-    near = np.abs(told - predict(model, LOG)).max(axis=(1, 2))
+    reported = predict(model.with_effects([again]), LOG)
+    np.testing.assert_array_equal(reported, predict(model.with_effects([field]), LOG))
+    near = np.abs(reported - predict(model, LOG)).max(axis=(1, 2))
     away = np.linalg.norm(coordinates(LOG, "joints")[:, None] - nodes, axis=2).min(axis=1)
     assert near[:4].min() > 0.5
     assert near[away > 2.5].max(initial=0.0) < 0.05

@@ -69,7 +69,7 @@ def test_a_bumped_focus_ring_is_named_and_measured():
     )
     found = diagnose(record(plain_cell().with_effects([bump]), LOG, seed=24))
     assert [e.name for e in found.effects] == ["optics_step"]
-    told = found.effects[0].parameters
-    assert told["at_frame"].value == LOG.frame[17]
+    reported = found.effects[0].parameters
+    assert reported["at_frame"].value == LOG.frame[17]
     for name, value in bump.as_mapping().items():
-        assert abs(told[name].value - value) <= 3.5 * told[name].sigma
+        assert abs(reported[name].value - value) <= 3.5 * reported[name].sigma

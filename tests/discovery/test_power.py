@@ -96,11 +96,11 @@ def test_more_noise_of_the_arm_hides_the_arm_and_leaves_the_board():
 def test_the_verb_tells_it_of_a_cell_and_of_a_plan():
     run = CliRunner().invoke
     plan = run(app, ["plan", "--power", str(CONFIGS / "ur3-robotiq.plan.yaml"), "--json"])
-    told = json.loads(plan.stdout)
-    assert told["noise"]["from"] == "simulation.noise"
-    effects = {(e["name"], e["law"]): e for e in told["effects"]}
+    reported = json.loads(plan.stdout)
+    assert reported["noise"]["from"] == "simulation.noise"
+    effects = {(e["name"], e["law"]): e for e in reported["effects"]}
     assert effects["focus_breathing", "inverse_square"]["smallest"]["k_px_m2"]["value"] > 0
-    names = [set(pair["names"]) for pair in told["not_told_apart"]]
+    names = [set(pair["names"]) for pair in reported["not_told_apart"]]
     assert {"entrance_pupil_shift", "protective_window"} in names
     text = run(app, ["plan", "--power", str(CONFIGS / "ur3-robotiq.plan.yaml")])
     assert text.exit_code == 0

@@ -59,8 +59,8 @@ def test_one_effect_is_named_measured_and_proved(name, values):
     assert effect.p_value < 1e-6
     for parameter, value in values.items():
         if parameter != "law":
-            told = effect.parameters[parameter]
-            assert abs(told.value - value) < 3.5 * told.sigma
+            reported = effect.parameters[parameter]
+            assert abs(reported.value - value) < 3.5 * reported.sigma
     assert found.proof is not None
     assert found.proof.rms_px_after < found.proof.rms_px_before
     # odds of the held-out frames, all together: the plain cell's larger noise hides some of it

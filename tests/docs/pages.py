@@ -63,5 +63,5 @@ def run_command(words: list[str]) -> str:
 def assert_same(printed: str, shown: str, *, relative: float = 0.1) -> None:
     """Words must be equal, numbers nearly: they depend a little on the machine."""
     assert _NUMBER.sub("#", printed).split() == _NUMBER.sub("#", shown).split(), printed
-    for value, told in zip(_NUMBER.findall(printed), _NUMBER.findall(shown), strict=True):
-        assert float(value) == pytest.approx(float(told), rel=relative, abs=0.011), printed
+    for value, reported in zip(_NUMBER.findall(printed), _NUMBER.findall(shown), strict=True):
+        assert float(value) == pytest.approx(float(reported), rel=relative, abs=0.011), printed

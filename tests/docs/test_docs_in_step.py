@@ -39,8 +39,8 @@ def test_the_readme_tour_says_what_it_shows(
     assert list(said) == ["doctor", "simulate", "calibrate", "diagnose", "export"]
     shown = README.read_text().split("names the bracket and nothing else:")[1]
     lines = [line.strip() for line in shown.splitlines() if line.startswith("    ")]
-    told = said["diagnose"].splitlines()
-    assert_same("\n".join(told[told.index(lines[0]) :][:3]), "\n".join(lines))
+    reported = said["diagnose"].splitlines()
+    assert_same("\n".join(reported[reported.index(lines[0]) :][:3]), "\n".join(lines))
     assert said["diagnose"].count("\n- ") == 1
     assert "distortion_model: plumb_bob" in said["export"]
     assert (tmp_path / "runs/bracket/diagnosis/report.html").exists()

@@ -54,9 +54,9 @@ def test_the_rehearsals_run_through_the_real_drivers(
     monkeypatch.chdir(tmp_path)
     page = ROOT / "docs" / f"tutorial-{arm}.md"
     shown = [block for block in blocks(page) if block.language == "console"]
-    told = [words for block in shown for words in commands(block)]
-    assert [words[0] for words in told if "--peers" in words] == ["run"]
-    for words in told:
+    reported = [words for block in shown for words in commands(block)]
+    assert [words[0] for words in reported if "--peers" in words] == ["run"]
+    for words in reported:
         if "--peers" in words:
             _shrink(tmp_path / "configs/irb140-eosens.cell.yaml")
         run_command(words)

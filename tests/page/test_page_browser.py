@@ -101,7 +101,7 @@ def live(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> LiveRun:
     """A run that stands still, which nobody reads an arm for."""
     monkeypatch.setattr(live_run, "SILENT_S", 1e6)
     live = LiveRun(plan_of(tmp_path), simulated=False, folder="runs/monday")
-    live.told(status(State.PAUSED, event="paused"))
+    live.status_changed(status(State.PAUSED, event="paused"))
     live.checked(checked(plan_of(tmp_path)))
     return live
 
@@ -136,7 +136,7 @@ def test_a_run_that_hangs_does_not_look_live(
 
 
 def test_after_the_end_the_page_stays_and_links_to_nothing(tab: Tab, live: LiveRun) -> None:
-    live.told(status(State.FINISHED))
+    live.status_changed(status(State.FINISHED))
     live.ended("completed: 12 frames", {"report": "runs/monday/report.html"})
     with served(live) as url:
         tab.open(url)

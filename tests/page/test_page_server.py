@@ -163,7 +163,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_may_not_be_framed(url: str) -
 
 def test_a_new_browser_hears_everything_at_once(live: LiveRun, url: str, tmp_path: Path) -> None:
     plan = plan_of(tmp_path)
-    live.told(status(State.MOVING, event="frame 2 logged"))
+    live.status_changed(status(State.MOVING, event="frame 2 logged"))
     live.checked(checked(plan))
     sigma_px = np.array([0.3, 0.2])
     distance_m = np.array([0.34, 0.6])
@@ -171,15 +171,15 @@ def test_a_new_browser_hears_everything_at_once(live: LiveRun, url: str, tmp_pat
         Estimate(9, 9, "", distance_m, 1370 + 0 * sigma_px, sigma_px, ("views at 0.5 m",), None)
     )
     wanted = {"run", "now", "frame", "camera", "coverage", "estimate", "messages"}
-    told = events(url, wanted)
-    assert told["run"]["simulated"] is True
-    assert told["now"]["state"] == "moving"
-    assert told["now"]["left_s"] == 95.0
-    assert len(told["frame"]["corners"]) == 70  # type: ignore[arg-type]
-    assert told["frame"]["max_blur_px"] == 6.0
-    assert told["camera"]["values"] == [{"name": "exposure", "value": "0.01 s"}]
-    assert told["estimate"]["history"] == [[9, 0.3]]
-    assert told["messages"]["lines"][0]["words"] == "frame 2 logged"  # type: ignore[index]
+    shown = events(url, wanted)
+    assert shown["run"]["simulated"] is True
+    assert shown["now"]["state"] == "moving"
+    assert shown["now"]["left_s"] == 95.0
+    assert len(shown["frame"]["corners"]) == 70  # type: ignore[arg-type]
+    assert shown["frame"]["max_blur_px"] == 6.0
+    assert shown["camera"]["values"] == [{"name": "exposure", "value": "0.01 s"}]
+    assert shown["estimate"]["history"] == [[9, 0.3]]
+    assert shown["messages"]["lines"][0]["words"] == "frame 2 logged"  # type: ignore[index]
 
 
 def test_coverage_counts_planned_and_seen(live: LiveRun, tmp_path: Path) -> None:
@@ -222,13 +222,13 @@ def test_a_picture_of_twelve_bits_shows_what_is_saturated() -> None:
 def test_a_run_that_hangs_is_told_as_hanging(
     live: LiveRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    live.told(status(State.MOVING))
+    live.status_changed(status(State.MOVING))
     live.read(checked(live._plan).shot.states[0])
     assert live.now()["silent_s"] == 0
     later = time.monotonic() + 7.0
     monkeypatch.setattr("cell.views.page.live_run.time.monotonic", lambda: later)
     assert live.now()["silent_s"] == pytest.approx(7.0, abs=0.5)
-    live.told(status(State.FINISHED))
+    live.status_changed(status(State.FINISHED))
     assert live.now()["silent_s"] == 0
 
 
@@ -236,7 +236,7 @@ def test_a_run_that_hangs_is_told_as_hanging(
 
 
 def test_pause_go_on_and_skip_reach_the_run(live: LiveRun, url: str) -> None:
-    live.told(status(State.MOVING, 3))
+    live.status_changed(status(State.MOVING, 3))
     assert press(url, "pause")[0] == 200
     assert live.requests.paused
     assert press(url, "go-on")[0] == 200
@@ -247,14 +247,14 @@ def test_pause_go_on_and_skip_reach_the_run(live: LiveRun, url: str) -> None:
 
 
 def test_a_click_that_comes_late_skips_no_other_view(live: LiveRun, url: str) -> None:
-    live.told(status(State.MOVING, 4))
+    live.status_changed(status(State.MOVING, 4))
     for view in ("3", "", "x"):
         assert press(url, "skip", f"view={view}")[0] == 409
     assert not live.requests.skips(4)
 
 
 def test_after_the_run_the_buttons_say_so(live: LiveRun, url: str) -> None:
-    live.told(status(State.FINISHED))
+    live.status_changed(status(State.FINISHED))
     assert press(url, "stop") == (409, "The run is over; the arm was let go of.")
 
 
@@ -324,8 +324,8 @@ def test_a_dry_run_is_stopped_through_its_page(tmp_path: Path) -> None:
             line = run.stderr.readline()
             assert line, "the run ended without an address"
             url = line.removeprefix("live page: ").strip() if "live page:" in line else ""
-        told = events(url, {"frame"})
-        assert told["frame"]["corners"]
+        shown = events(url, {"frame"})
+        assert shown["frame"]["corners"]
         assert press(url, "stop")[0] == 200
         out, err = run.communicate(timeout=120)
     assert run.returncode == EXIT_OPERATOR, err

@@ -56,9 +56,9 @@ def test_frames_that_carry_an_estimate_are_listed() -> None:
 
 def test_without_it_the_reason_is_told() -> None:
     content = _content(cross_validation=None, missing={"cross_validation": "9 frames took part"})
-    told = "Not cross-validated: 9 frames took part."
-    assert told in _page(content)
-    assert told in sentences(replace(made_up_cell.full(9), calibration=content))
+    reported = "Not cross-validated: 9 frames took part."
+    assert reported in _page(content)
+    assert reported in sentences(replace(made_up_cell.full(9), calibration=content))
     assert "not cross-validated: 9 frames took part" in calibration_summary(content)
 
 

@@ -172,8 +172,10 @@ def test_what_is_unexplained_warns_in_the_first_sentence(tmp_path: Path) -> None
         },
     }
     data = made_up_cell.full(9)
-    told = made_up_cell.diagnosis(verdict="unexplained", unexplained=left, unexplained_all=[left])
-    data = replace(data, diagnosis=told)
+    reported = made_up_cell.diagnosis(
+        verdict="unexplained", unexplained=left, unexplained_all=[left]
+    )
+    data = replace(data, diagnosis=reported)
     _, text = parsed(data, tmp_path)
     assert "With care" in text
     assert "The mounted pose follows gravity x, upright" in text

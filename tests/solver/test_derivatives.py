@@ -82,8 +82,8 @@ def _check(
     ours = np.concatenate([by_free, by_flange], axis=-1)[:, CORNERS]
     wanted = []
     for i in frames:
-        told = run.pixels(zero(numbers), i, CORNERS)
-        assert np.abs(told - pixels[i]).max() < 1e-6, f"frame {i}: another pixel"
+        reported = run.pixels(zero(numbers), i, CORNERS)
+        assert np.abs(reported - pixels[i]).max() < 1e-6, f"frame {i}: another pixel"
         wanted.append(autograd.jacobian(run.pixels)(zero(numbers), i, CORNERS))
     expected = np.array(wanted)
     scale = np.abs(expected).max(axis=(0, 1, 2))

@@ -123,14 +123,16 @@ def test_the_map_is_in_the_file_and_tells_what_the_functions_tell() -> None:
     written = CalibrationFile.model_validate(as_mapping(calibrate(true.views), "a run"))
     assert written.uncertainty is not None
     assert written.distance_range_m is not None
-    told = written.uncertainty
-    assert (told.distance_m[0], told.distance_m[-1]) == pytest.approx(written.distance_range_m)
-    assert np.shape(told.projection_sigma_px) == (4, 15, 2)
-    assert np.shape(told.workpiece_sigma_m) == (4, 15, 3)
+    reported = written.uncertainty
+    assert (reported.distance_m[0], reported.distance_m[-1]) == pytest.approx(
+        written.distance_range_m
+    )
+    assert np.shape(reported.projection_sigma_px) == (4, 15, 2)
+    assert np.shape(reported.workpiece_sigma_m) == (4, 15, 3)
     # along the axis the focal length alone makes an error of its own share of the distance
     sigma = written.solutions["joint_ml"].sigma["alpha_px"]
-    along_m = np.array(told.workpiece_sigma_m)[:, :, 2].min(axis=1)
-    assert (along_m < 50 * sigma / ALPHA0 * np.array(told.distance_m)).all()
+    along_m = np.array(reported.workpiece_sigma_m)[:, :, 2].min(axis=1)
+    assert (along_m < 50 * sigma / ALPHA0 * np.array(reported.distance_m)).all()
     assert (along_m > 0).all()
 
 

@@ -152,15 +152,15 @@ monte_carlo:
     noise: {corner_px: {uniform: [0.02, 0.1]}}
 """
     home = tmp_path_factory.mktemp("finished")
-    path, told = write_study(home, content), []
+    path, reported = write_study(home, content), []
     outcome = run_study(
         read_study(path),
         home / "out",
         scheduler=scheduler,
-        listener=lambda done, total: told.append((done, total)),
+        listener=lambda done, total: reported.append((done, total)),
     )
-    assert told == sorted(told)
-    assert (told[0], told[-1]) == ((0, 4), (4, 4))
+    assert reported == sorted(reported)
+    assert (reported[0], reported[-1]) == ((0, 4), (4, 4))
     return path, home / "out", outcome
 
 
@@ -185,8 +185,8 @@ def test_errors_are_held_against_the_truth(finished: Finished) -> None:
         for solution in case["solutions"]
     }
     assert z["as it is", "zhang_mle"] > 8
-    for told in ("zhang_mle", "fixed_alpha_mle", "joint_ml", "robot"):
-        assert 0.2 < z["still", told] < 3
+    for reported in ("zhang_mle", "fixed_alpha_mle", "joint_ml", "robot"):
+        assert 0.2 < z["still", reported] < 3
     assert 0.2 < z["as it is", "joint_ml"] < 3
     drawn = [row["drawn"][0]["value"] for row in outcome.rows if row["case"] == "still"]
     assert len(set(drawn)) == 2
@@ -248,9 +248,9 @@ def test_what_failed_is_told_and_tried_again(tmp_path: Path, scheduler: str, cel
 
     status, out, err = cell(*words, "--json")
     assert (status, err) == (1, "")
-    told = json.loads(out)
-    assert told["tasks"] == 2
-    (failed,) = told["failed"]
+    reported = json.loads(out)
+    assert reported["tasks"] == 2
+    (failed,) = reported["failed"]
     assert failed["key"].endswith("runs/broken")
     assert "frames.jsonl: cannot be read" in failed["reason"]
     assert failed["tries"] == 1
@@ -297,9 +297,9 @@ def test_power_counts_what_the_diagnosis_names(tmp_path: Path, scheduler: str) -
     assert (plain["detected"]["share"], flex["detected"]["share"]) == (0.0, 1.0)
     assert flex["alone"]["hits"] == flex["alone"]["runs"] == 1
     estimates = next(row for row in outcome.rows if row["effect"] == "mount_flex")["estimates"]
-    told = next(estimate for estimate in estimates if estimate["quantity"] == "rad_per_g")
-    assert told["truth"] == 0.0005
-    assert abs(told["z"]) < 5
+    reported = next(estimate for estimate in estimates if estimate["quantity"] == "rad_per_g")
+    assert reported["truth"] == 0.0005
+    assert abs(reported["z"]) < 5
 
 
 def test_recordings_of_a_folder(tmp_path: Path, scheduler: str) -> None:
@@ -372,8 +372,8 @@ def test_the_doctor_names_what_is_missing_and_does_not_mind(
         return "1.0"
 
     monkeypatch.setattr(import_module("cell.verbs.doctor.installed"), "version", installed)
-    told = {finding.name: finding for finding in examine(None)}
+    reported = {finding.name: finding for finding in examine(None)}
     for name in extra.PACKAGES:
-        assert not told[name].ready
-        assert not told[name].blocks
-        assert extra.MEND in told[name].line()
+        assert not reported[name].ready
+        assert not reported[name].blocks
+        assert extra.MEND in reported[name].line()

@@ -84,7 +84,7 @@ def test_a_plan_s_most_telling_views_are_run_and_checked(
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (("--length-m", "0.2"), "--length-m and --corners go together"),
         (("--length-m", "0.2", "--corners", "0-0"), "give ROW,COL:ROW,COL"),
@@ -98,11 +98,11 @@ def test_what_cannot_be_used_is_refused_in_words(
     capsys: Cli,
     monkeypatch: pytest.MonkeyPatch,
     words: tuple[str, ...],
-    told: str,
+    reported: str,
 ) -> None:
     monkeypatch.setattr(sys, "argv", [])
     assert _cell("verify", bench / "same", bench / "old", *words) == 2
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err
 
 
 def test_a_recording_that_was_never_calibrated_is_no_calibration(

@@ -154,12 +154,12 @@ def plan_power(model: CellModel, views: Views, noise: Noise) -> Power:
     # what rounding leaves of a number that the cell's own numbers absorb is nothing
     lost = np.diag(projected) < _LOST * raw
     projected[lost] = projected[:, lost] = 0.0
-    told = tuple(
+    reported = tuple(
         _effect_power(at, effects, found, projected, found.owner[amounts])
         for at in range(len(effects))
     )
     frames = int((np.abs(found.frames).max(axis=(1, 2)) > 0.0).sum())
-    return Power(told, unseen(views), noise, frames)
+    return Power(reported, unseen(views), noise, frames)
 
 
 def usual_shape(effect: Effect, views: Views) -> FloatArray:

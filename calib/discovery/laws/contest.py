@@ -96,9 +96,9 @@ def _rival(rival: Tried, best: Tried) -> str:
     return f"{law.form.name}: {law.site.name} along {along} ({behind:.1f} behind)"
 
 
-def as_cell(told: Sequence[Tried], before: Trial) -> Cell:
+def as_cell(best_first: Sequence[Tried], before: Trial) -> Cell:
     """The law as what was found to be left: where it lives, and how sure that is."""
-    tried, rivals = told[0], told[1:]
+    tried, rivals = best_first[0], best_first[1:]
     law = tried.found.law
     gain = before.fit.minus_two_log - tried.trial.fit.minus_two_log
     p_value = chi2_tail(gain, tried.found.columns)

@@ -137,15 +137,15 @@ class Scan:
     def best(self, at_most: int) -> list[Found]:
         """The most promising laws, no two of the same site, covariates and form."""
         judged = [one for form in forms() for one in self._of_form(form)]
-        told: dict[tuple[str, str, str], _Judged] = {}
+        reported: dict[tuple[str, str, str], _Judged] = {}
         for one in sorted(judged, key=lambda j: -j.worth):
             along = "*".join(c.name for c in one.tried.covariates)
-            told.setdefault((one.group.site, along, one.form.key), one)
-            if len(told) == at_most:
+            reported.setdefault((one.group.site, along, one.form.key), one)
+            if len(reported) == at_most:
                 break
         return [
             Found(self._law(one), one.gain, one.columns, one.choices, one.worth)
-            for one in told.values()
+            for one in reported.values()
         ]
 
     def _of_form(self, form: Form) -> Iterator[_Judged]:

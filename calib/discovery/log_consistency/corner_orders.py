@@ -80,10 +80,10 @@ def find_corner_orders(views: Views, odd: OddFrames, camera_from_board: FloatArr
             found.setdefault(int(views.frame[i]), order)
     if not found:
         return None
-    told = ", ".join(f"frame {frame}: {order.words}" for frame, order in sorted(found.items()))
+    reported = ", ".join(f"frame {frame}: {order.words}" for frame, order in sorted(found.items()))
     return Mixup(
         name="corner_order",
-        physics=f"Corners are numbered otherwise than in the other frames: {told}.",
+        physics=f"Corners are numbered otherwise than in the other frames: {reported}.",
         remedy="Number the corners from the same end of the board in every frame.",
         mend=_renumbering(found),
         parameters={"frames": (float(len(found)), "frame")},

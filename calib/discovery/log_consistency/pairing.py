@@ -57,12 +57,12 @@ def find_pairing(views: Views, log: Views, loop: FloatArray, found: OddFrames | 
     alone = [i for i in lost if not _beside(lost, i)]
     few = len(alone) <= max(1, _MOST_ODD_SHARE * len(views))
     dropped = tuple(int(views.frame[i]) for i in alone) if few else ()
-    told = {
+    reported = {
         int(views.frame[i]): int(log.frame[source[i]]) for i in np.flatnonzero(odd & (source >= 0))
     }
     miss = (found.closure.typical_angle_rad, found.closure.typical_distance_m)
     paired = views.take(np.flatnonzero(~odd | (source >= 0)))
-    return Pairing(mispaired(paired, told, miss), dropped)
+    return Pairing(mispaired(paired, reported, miss), dropped)
 
 
 def _beside(lost: list[int], i: int) -> bool:

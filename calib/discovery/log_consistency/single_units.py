@@ -47,10 +47,10 @@ def find_single_units(views: Views, odd: OddFrames, loop: FloatArray) -> Mixup |
             poses[i, :3, 3] *= UNITS[found[int(frame)]] if int(frame) in found else 1.0
         return replace(some, base_from_flange=poses)
 
-    told = ", ".join(f"that of frame {frame} is in {unit}s" for frame, unit in found.items())
+    reported = ", ".join(f"that of frame {frame} is in {unit}s" for frame, unit in found.items())
     return Mixup(
         name="length_unit",
-        physics=f"The log says metres, but not every position is: {told}.",
+        physics=f"The log says metres, but not every position is: {reported}.",
         remedy="Correct the unit in the program that writes the log.",
         mend=mend,
         parameters={"frames": (float(len(found)), "frame")},

@@ -51,15 +51,15 @@ def parse_model(path: Path, data: CommentedMap, model: type[Model]) -> Model:
         return model.model_validate(data)
     except ValidationError as invalid:
         known = sorted(_field_names(model))
-        told = sorted(_placed_error(path, data, error, known) for error in invalid.errors())
-        raise InputError("\n".join(dict.fromkeys(line for _, line in told))) from None
+        reported = sorted(_placed_error(path, data, error, known) for error in invalid.errors())
+        raise InputError("\n".join(dict.fromkeys(line for _, line in reported))) from None
 
 
 def read_mapping(path: Path) -> CommentedMap:
     """Read a YAML file whose top level is a mapping, keeping line and column of every key."""
     text = read_text(path, YAML_BYTES)
     check_text(text, path)
-    with _told(path):
+    with _input_errors(path):
         data = YAML(typ="rt", pure=True).load(text)
     if not isinstance(data, CommentedMap):
         found = "is empty" if data is None else f"holds a {type(data).__name__}"
@@ -75,12 +75,12 @@ def read_mapping(path: Path) -> CommentedMap:
 
 def load_yaml_documents(text: str, path: Path) -> list[Any]:
     """The YAML documents of a text, in plain values; raises `InputError`."""
-    with _told(path):
+    with _input_errors(path):
         return list(YAML(typ="safe", pure=True).load_all(text))
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _input_errors(path: Path) -> Iterator[None]:
     """Turn whatever the YAML reader raises into `InputError`."""
     try:
         yield
@@ -91,8 +91,8 @@ def _told(path: Path) -> Iterator[None]:
     except RecursionError:
         raise InputError(f"{path}: is nested too deeply") from None
     except Exception as broken:  # a tag on what it does not fit: the reader's errors have no bound
-        told = str(broken).partition("\n")[0][:200] or type(broken).__name__
-        raise InputError(f"{path}: cannot be read as YAML: {told}") from None
+        reported = str(broken).partition("\n")[0][:200] or type(broken).__name__
+        raise InputError(f"{path}: cannot be read as YAML: {reported}") from None
 
 
 def check_schema(path: Path, data: CommentedMap, schema: str) -> None:

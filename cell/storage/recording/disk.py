@@ -13,7 +13,7 @@ from cell.errors import DiskFailed
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
+def disk_errors(path: Path) -> Iterator[None]:
     """Turn what the disk refuses into `DiskFailed`."""
     try:
         yield

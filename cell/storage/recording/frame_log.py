@@ -22,7 +22,7 @@ from cell.storage.recording.frames import FrameRecord
 VECTORS = ("joints_rad", "joint_velocity_rad_s", "approach_joints_rad")
 _OTHER_UNIT = 100.0
 """So many times the others' distance from the base, and a pose is in another unit than they are."""
-_TOLD = 5
+_SHOWN_AT_MOST = 5
 
 log = logging.getLogger(__name__)
 
@@ -72,15 +72,15 @@ def read_frames(path: Path) -> FrameLog:
     for frame, why in _implausible(tuple(frames.values())).items():
         rejected[frame] = f"{path}:{lines[frame]}: frame {frame}: {why}"
         frames[frame] = FrameRecord(frame=frame, image=frames[frame].image)
-    _tell(path, len(frames), rejected)
+    _warn_of_rejected(path, len(frames), rejected)
     return FrameLog(tuple(frames.values()), rejected)
 
 
-def _tell(path: Path, frames: int, rejected: Mapping[int, str]) -> None:
+def _warn_of_rejected(path: Path, frames: int, rejected: Mapping[int, str]) -> None:
     reasons = [line for why in rejected.values() for line in why.splitlines()]
     if rejected and len(rejected) == frames:
-        more = len(reasons) - _TOLD
-        shown = reasons[:_TOLD] + ([f"{path}: and {more} more"] if more > 0 else [])
+        more = len(reasons) - _SHOWN_AT_MOST
+        shown = reasons[:_SHOWN_AT_MOST] + ([f"{path}: and {more} more"] if more > 0 else [])
         raise InputError("\n".join(shown))
     for line in reasons:
         log.warning("%s; the frame is left out", line)

@@ -196,8 +196,8 @@ def _joint_count(path: Path, frames: Sequence[FrameRecord]) -> int:
             if vector is not None:
                 counts.setdefault(len(vector), frame.frame)
     if len(counts) > 1:
-        told = ", ".join(f"{count} in frame {frame}" for count, frame in counts.items())
-        raise InputError(f"{path}: frames have different numbers of joints: {told}")
+        disk_errors = ", ".join(f"{count} in frame {frame}" for count, frame in counts.items())
+        raise InputError(f"{path}: frames have different numbers of joints: {disk_errors}")
     return next(iter(counts), 6)
 
 

@@ -30,7 +30,7 @@ from cell.storage.whole import sync_folder, write_whole
 _PNG_FAST = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 UNLOGGED = "unlogged"
 _OWN_NAME = re.compile(r"\d{5,}\.png")
-_TOLD = 5
+_SHOWN_AT_MOST = 5
 
 
 class RecordingWriter:
@@ -111,7 +111,7 @@ class RecordingWriter:
             The disk does not take it, the recording has a picture of that frame number already, or
             what was written before was deleted or replaced meanwhile.
         """
-        with disk.told(self.folder):
+        with disk.disk_errors(self.folder):
             self._kept.check()
             if image is not None:
                 record = record.model_copy(update={"image": self._write_image(record.frame, image)})
@@ -121,7 +121,7 @@ class RecordingWriter:
 
     def check_whole(self) -> None:
         """Raise `DiskFailed` where anything that this writer wrote is no longer in its place."""
-        with disk.told(self.folder):
+        with disk.disk_errors(self.folder):
             self._kept.check_all()
 
     def adopt(self, picture: Path, name: str) -> None:
@@ -136,7 +136,7 @@ class RecordingWriter:
         """
         data = read_bytes(picture, PICTURE_BYTES)
         there = inside(self.folder, name, f"{self.folder}: picture")
-        with disk.told(self.folder):
+        with disk.disk_errors(self.folder):
             there.parent.mkdir(parents=True, exist_ok=True)
             _write_new_file(there, data)
 
@@ -153,10 +153,10 @@ class RecordingWriter:
         kept = {k: v for k, v in {**extra, **values}.items() if v is not None}
         if kept == extra:
             return
-        told = self.header.as_mapping()
-        told = {k: v for k, v in told.items() if k not in extra} | kept
-        self.header = Header.model_validate(told)
-        write_whole(self.folder / header_file.FILE_NAME, yaml_text(told))
+        disk_errors = self.header.as_mapping()
+        disk_errors = {k: v for k, v in disk_errors.items() if k not in extra} | kept
+        self.header = Header.model_validate(disk_errors)
+        write_whole(self.folder / header_file.FILE_NAME, yaml_text(disk_errors))
 
     def close(self) -> None:
         """Let go of the files. Idempotent."""
@@ -198,7 +198,9 @@ def _check_pictures(folder: Path, frames: tuple[FrameRecord, ...]) -> None:
     paths = {f.frame: inside(folder, f.image or "", f"{where}: frame {f.frame}") for f in named}
     lost = [n for n, path in paths.items() if not (plain_file(path) and path.stat().st_size)]
     if lost:
-        shown = ", ".join(map(str, lost[:_TOLD])) + (" ..." if len(lost) > _TOLD else "")
+        shown = ", ".join(map(str, lost[:_SHOWN_AT_MOST])) + (
+            " ..." if len(lost) > _SHOWN_AT_MOST else ""
+        )
         raise InputError(
             f"{where}: the pictures of {len(lost)} frames are missing or empty (frames {shown})."
             " Put them back, or start anew with another -o."

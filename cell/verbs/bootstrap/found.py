@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from calib.calibration.roughly_known import FRAMES_TELL_NOISE, with_sigma
+from calib.calibration.roughly_known import FRAMES_FOR_NOISE, with_sigma
 from calib.chain.model import CellModel, evaluate
 from calib.views import FloatArray
 from cell.errors import BadAnswer
@@ -84,7 +84,7 @@ class Found:
         sigma_rad = float(max(self.mounted_sigma_rad.max(), self.fixed_sigma_rad.max()))
         share = self.alpha_sigma_px / self.alpha_px
         good = sigma_m < _GOOD_M and sigma_rad < _GOOD_RAD and share < _GOOD_ALPHA_SHARE
-        if self.frames >= FRAMES_TELL_NOISE and good:
+        if self.frames >= FRAMES_FOR_NOISE and good:
             return
         raise BadAnswer(
             f"{self.frames} frames leave the place of camera and board open by"
@@ -110,10 +110,10 @@ class Found:
             "rms_px": round(self.rms_px, 3),
             "alpha_px": round(self.alpha_px, 1),
             "alpha_sigma_px": round(self.alpha_sigma_px, 1),
-            "mounted": _told(
+            "mounted": _with_sigmas(
                 self.flange_from_mounted, self.mounted_sigma_m, self.mounted_sigma_rad
             ),
-            "fixed": _told(self.base_from_fixed, self.fixed_sigma_m, self.fixed_sigma_rad),
+            "fixed": _with_sigmas(self.base_from_fixed, self.fixed_sigma_m, self.fixed_sigma_rad),
         }
 
     def lines(self) -> list[str]:
@@ -123,13 +123,13 @@ class Found:
              self.mounted_sigma_rad),
             ("layout.fixed", self.base_from_fixed, self.fixed_sigma_m, self.fixed_sigma_rad),
         )  # fmt: skip
-        told = [
+        rows = [
             f"{name}: {_mm(pose[:3, 3])} mm, known to {_mm(sigma_m)} mm and"
             f" {np.degrees(sigma_rad).max():.2f} deg (one sigma)"
             for name, pose, sigma_m, sigma_rad in places
         ]
         return [
-            *told,
+            *rows,
             f"layout.alpha_px: {self.alpha_px:.1f}, known to {self.alpha_sigma_px:.1f} px",
             f"{self.frames} frames, rms {self.rms_px:.2f} px",
         ]
@@ -139,7 +139,9 @@ def _pose(a_from_b: FloatArray) -> Pose:
     return Pose.of(RigidTransform.from_matrix(a_from_b))
 
 
-def _told(a_from_b: FloatArray, sigma_m: FloatArray, sigma_rad: FloatArray) -> dict[str, Any]:
+def _with_sigmas(
+    a_from_b: FloatArray, sigma_m: FloatArray, sigma_rad: FloatArray
+) -> dict[str, Any]:
     pose = _pose(a_from_b)
     return {
         "p_m": list(pose.p_m),

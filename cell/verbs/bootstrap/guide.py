@@ -22,7 +22,7 @@ from cell.sequencer.watcher import Checked
 from cell.storage.files.cell_file import CellFile, Layout
 from cell.storage.files.plan_file import View
 from cell.verbs.bootstrap.knowledge import Knowledge
-from cell.verbs.bootstrap.layout_doubt import LayoutDoubt
+from cell.verbs.bootstrap.layout_uncertainty import LayoutUncertainty
 from cell.verbs.bootstrap.near_guard import NearGuard
 from cell.verbs.bootstrap.plausible import check_moves, check_place
 from cell.verbs.bootstrap.probing_views import (
@@ -50,7 +50,7 @@ class BootstrapGuide(Guide):
         With the layout, as the file has it.
     guard:
         Of the whole bootstrap.
-    told:
+    uncertainty:
         How far the layout may be off.
 
     Attributes
@@ -63,12 +63,14 @@ class BootstrapGuide(Guide):
         Why the last move that was left out, or made smaller, was.
     """
 
-    def __init__(self, cell: CellFile, layout: Layout, guard: NearGuard, told: LayoutDoubt) -> None:
+    def __init__(
+        self, cell: CellFile, layout: Layout, guard: NearGuard, uncertainty: LayoutUncertainty
+    ) -> None:
         self._guard = guard
         self.knowledge: Knowledge | None = None
         self.refusal = ""
         self.layout = layout
-        self._cell, self._told = cell, told
+        self._cell, self._uncertainty = cell, uncertainty
         self._centre_m = cell.board.board().corners_m.mean(axis=0)
         self._seen = Seen(cell)
         self._new: list[tuple[Shot, Detection]] = []
@@ -119,13 +121,15 @@ class BootstrapGuide(Guide):
         views = self._seen.add(shot, detection, self._model(mounted, alpha_px))
         refocuses = self._cell.camera.focus == "auto"
         try:
-            known = Knowledge.of(views, mounted, alpha_px, self._told.doubt, refocuses=refocuses)
+            known = Knowledge.of(
+                views, mounted, alpha_px, self._uncertainty.prior_sigma, refocuses=refocuses
+            )
         except CalibrationError as error:
             raise InputError(f"frame {shot.index}: {error}") from None
         if len(views) == 1:
             distance_m = float(evaluate(known.fit.model, views).distance_m[0])
-            check_place(self._cell, self.layout, known.fit.model, distance_m, self._told)
-        check_moves(self._cell, mounted, known.fit, self._told)
+            check_place(self._cell, self.layout, known.fit.model, distance_m, self._uncertainty)
+        check_moves(self._cell, mounted, known.fit, self._uncertainty)
         self.knowledge = known
 
     def _model(self, mounted: FloatArray, alpha_px: float) -> CellModel:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.calibration.roughly_known import (
-    Doubt,
+    GuessSigma,
     fit_roughly_known,
     guess_from_one_view,
     with_sigma,
@@ -44,13 +44,13 @@ class Knowledge:
         views: Views,
         flange_from_mounted: FloatArray,
         alpha_px: float,
-        doubt: Doubt,
+        prior_sigma: GuessSigma,
         *,
         refocuses: bool,
     ) -> Knowledge:
         """Fit; raises `CalibrationError` where the first view shows no plane."""
         guess = guess_from_one_view(views, flange_from_mounted, alpha_px, refocuses=refocuses)
-        return cls(views, fit_roughly_known(views, guess, doubt))
+        return cls(views, fit_roughly_known(views, guess, prior_sigma))
 
     @property
     def first_camera_from_board(self) -> FloatArray:

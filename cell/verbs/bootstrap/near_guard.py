@@ -16,7 +16,7 @@ from cell.sequencer.bodies import doubtful_scene_of, outline_m
 from cell.sequencer.guard import Guard
 from cell.storage.files.cell_file import CellFile
 from cell.storage.files.parts import Box
-from cell.verbs.bootstrap.layout_doubt import LayoutDoubt
+from cell.verbs.bootstrap.layout_uncertainty import LayoutUncertainty
 from drivers.errors import SafetyError
 
 SPEED_M_S = 0.05
@@ -35,23 +35,27 @@ class NearGuard(Guard):
     ----------
     start_rad:
         (6,) where it stood.
-    doubt_m:
+    uncertainty_m:
         How far what hangs on the flange may be from where the layout has it.
     """
 
     start_rad: FloatArray
-    doubt_m: float
+    uncertainty_m: float
 
     @classmethod
-    def around(cls, cell: CellFile, start_rad: FloatArray, told: LayoutDoubt) -> NearGuard:
+    def around(
+        cls, cell: CellFile, start_rad: FloatArray, uncertainty: LayoutUncertainty
+    ) -> NearGuard:
         """The guard of a cell whose layout is off by no more than is told; raises `InputError`."""
         joint_speed = float(np.radians(JOINT_SPEED_DEG_S))
-        return cls(cell, SPEED_M_S, joint_speed, start_rad, carried_doubt_m(cell, told))
+        return cls(
+            cell, SPEED_M_S, joint_speed, start_rad, carried_uncertainty_m(cell, uncertainty)
+        )
 
     @cached_property
     def scene(self) -> Scene:
         """The cell's bodies, what hangs on the flange larger by what it may be off."""
-        return doubtful_scene_of(self.cell, self.kinematics, self.doubt_m)
+        return doubtful_scene_of(self.cell, self.kinematics, self.uncertainty_m)
 
     def with_box(self, box: Box) -> NearGuard:
         """The same guard, kept out of one box more."""
@@ -87,7 +91,7 @@ class NearGuard(Guard):
         super().check_move(start_rad, end_rad, where)
 
 
-def carried_doubt_m(cell: CellFile, told: LayoutDoubt) -> float:
+def carried_uncertainty_m(cell: CellFile, uncertainty: LayoutUncertainty) -> float:
     """How far any point of what hangs on the flange may be from where the layout has it.
 
     Raises
@@ -97,13 +101,13 @@ def carried_doubt_m(cell: CellFile, told: LayoutDoubt) -> float:
     """
     carried = outline_m(cell.board.board()) if cell.mount == "eye_to_hand" else np.zeros((1, 3))
     reach_m = float(np.linalg.norm(carried, axis=1).max())
-    doubt_m = told.mount_m + reach_m * 2.0 * float(np.sin(0.5 * told.mount_rad))
+    uncertainty_m = uncertainty.mount_m + reach_m * 2.0 * float(np.sin(0.5 * uncertainty.mount_rad))
     if cell.layout is None:  # what is at the flange may point anywhere
-        doubt_m = told.reach_m + reach_m
+        uncertainty_m = uncertainty.reach_m + reach_m
     space = cell.workspace
-    if space is not None and min(np.subtract(space.high_m, space.low_m)) <= 2 * doubt_m:
+    if space is not None and min(np.subtract(space.high_m, space.low_m)) <= 2 * uncertainty_m:
         raise InputError(
             f"cell {cell.name}: workspace: nothing is left of it for what is on the flange, which"
-            f" may be {1e3 * doubt_m:.0f} mm off on every side"
+            f" may be {1e3 * uncertainty_m:.0f} mm off on every side"
         )
-    return doubt_m
+    return uncertainty_m

@@ -11,7 +11,7 @@ from calib.solver.joint import JointFit
 from calib.views import FloatArray
 from cell.errors import InputError
 from cell.storage.files.cell_file import CellFile, Layout
-from cell.verbs.bootstrap.layout_doubt import LayoutDoubt
+from cell.verbs.bootstrap.layout_uncertainty import LayoutUncertainty
 
 _AXIS_RAD = float(np.radians(45.0))
 _FAR_OFF = 3.0
@@ -20,7 +20,11 @@ _BAD_PX = 10.0
 
 
 def check_place(
-    cell: CellFile, layout: Layout, seen: CellModel, distance_m: float, told: LayoutDoubt
+    cell: CellFile,
+    layout: Layout,
+    seen: CellModel,
+    distance_m: float,
+    uncertainty: LayoutUncertainty,
 ) -> None:
     """Raise `InputError` where the first picture puts the fixed part elsewhere than the layout."""
     what = "board" if cell.mount == "eye_in_hand" else "camera"
@@ -29,7 +33,11 @@ def check_place(
     if cell.mount == "eye_in_hand":
         centre = cell.board.board().corners_m.mean(axis=0)
     off_m = float(np.linalg.norm(_point(seen.base_from_fixed, centre) - _point(fixed, centre)))
-    bound_m = told.fixed_m + told.mount_m + distance_m * (told.mount_rad + told.alpha_share)
+    bound_m = (
+        uncertainty.fixed_m
+        + uncertainty.mount_m
+        + distance_m * (uncertainty.mount_rad + uncertainty.alpha_share)
+    )
     if off_m > bound_m:
         raise InputError(
             f"cell {cell.name}: layout: from here the picture puts the {what} {off_m:.2f} m from"
@@ -46,13 +54,15 @@ def check_place(
         )
 
 
-def check_moves(cell: CellFile, guess: FloatArray, fit: JointFit, told: LayoutDoubt) -> None:
+def check_moves(
+    cell: CellFile, guess: FloatArray, fit: JointFit, uncertainty: LayoutUncertainty
+) -> None:
     """Raise `InputError` where the board did not move in the picture as the arm was moved."""
     off = rigid.inverse(guess) @ fit.model.flange_from_mounted
     off_m = float(np.linalg.norm(off[:3, 3]))
     off_rad = float(Rotation.from_matrix(off[:3, :3]).magnitude())
     rms_px = float(np.sqrt(np.nanmean(fit.residual_px**2)))
-    near = off_m < _FAR_OFF * told.mount_m and off_rad < _FAR_OFF * told.mount_rad
+    near = off_m < _FAR_OFF * uncertainty.mount_m and off_rad < _FAR_OFF * uncertainty.mount_rad
     if near and rms_px < _BAD_PX:
         return
     raise InputError(

@@ -21,7 +21,7 @@ from cell.storage.files.cell_file import CellFile, Layout
 from cell.storage.files.parts import Pose
 from cell.storage.files.plan_file import View
 from cell.verbs.bootstrap.guide import BootstrapGuide, view_of
-from cell.verbs.bootstrap.layout_doubt import LayoutDoubt
+from cell.verbs.bootstrap.layout_uncertainty import LayoutUncertainty
 from cell.verbs.bootstrap.near_guard import NearGuard
 from cell.verbs.bootstrap.seen import Seen
 from drivers.errors import SafetyError
@@ -41,13 +41,13 @@ class ProbingGuide(Guide):
     ----------
     cell:
         Without a layout.
-    guard, told:
+    guard, uncertainty:
         As for `BootstrapGuide`.
     """
 
-    def __init__(self, cell: CellFile, guard: NearGuard, told: LayoutDoubt) -> None:
+    def __init__(self, cell: CellFile, guard: NearGuard, uncertainty: LayoutUncertainty) -> None:
         self.then: BootstrapGuide | None = None
-        self._cell, self._guard, self._told = cell, guard, told
+        self._cell, self._guard, self._uncertainty = cell, guard, uncertainty
         self._frames: list[Checked] = []
         self._shifts: list[FloatArray] = []
 
@@ -86,8 +86,8 @@ class ProbingGuide(Guide):
             return self._shift(views)
         layout = self._layout(views)
         cell = self._cell.model_copy(update={"layout": layout})
-        told = replace(self._told, mount_m=self._told.reach_m)
-        self.then = BootstrapGuide(cell, layout, self._guard, told)
+        uncertainty = replace(self._uncertainty, mount_m=self._uncertainty.reach_m)
+        self.then = BootstrapGuide(cell, layout, self._guard, uncertainty)
         for frame in self._frames:
             self.then.checked(frame)
         return self.then.next_view()

@@ -22,7 +22,7 @@ from cell.storage.files.plan_file import SCHEMA, Plan, PlanFile
 from cell.storage.files.writing import check_new, write_new, yaml_text
 from cell.verbs.bootstrap.found import Found
 from cell.verbs.bootstrap.guide import BootstrapGuide
-from cell.verbs.bootstrap.layout_doubt import LayoutDoubt
+from cell.verbs.bootstrap.layout_uncertainty import LayoutUncertainty
 from cell.verbs.bootstrap.near_guard import JOINT_SPEED_DEG_S, SPEED_M_S, NearGuard
 from cell.verbs.bootstrap.probing import ProbingGuide
 from cell.verbs.bootstrap.standing import where_it_stands
@@ -39,7 +39,7 @@ class Bootstrap:
     ----------
     path, cell:
         The cell file, read; its layout may be missing.
-    told:
+    uncertainty:
         How far the layout may be off.
     recording:
         Folder of the frames.
@@ -49,13 +49,15 @@ class Bootstrap:
 
     path: Path
     cell: CellFile
-    told: LayoutDoubt
+    uncertainty: LayoutUncertainty
     recording: Path
     found_path: Path
     plan_path: Path
 
     @classmethod
-    def of(cls, path: Path, recording: Path, beside: Path, told: LayoutDoubt) -> Bootstrap:
+    def of(
+        cls, path: Path, recording: Path, beside: Path, uncertainty: LayoutUncertainty
+    ) -> Bootstrap:
         """Read the cell; nothing has moved yet.
 
         Parameters
@@ -64,7 +66,7 @@ class Bootstrap:
             The cell file, and the folder of the frames.
         beside:
             Folder of the new cell and plan.
-        told:
+        uncertainty:
             How far the layout may be off.
 
         Raises
@@ -78,7 +80,7 @@ class Bootstrap:
         found, plan = beside / f"{stem}.found.yaml", beside / f"{stem}.found.plan.yaml"
         check_new(found)
         check_new(plan)
-        return cls(path, cell, told, recording, found, plan)
+        return cls(path, cell, uncertainty, recording, found, plan)
 
     def devices(self, *, dry_run: bool, start_deg: tuple[float, ...] | None = None) -> Devices:
         """Arm and camera; in a dry run the arm stands at `start_deg`, or the layout's home.
@@ -117,7 +119,7 @@ class Bootstrap:
         """
         named = Guard(self.cell, SPEED_M_S, np.radians(JOINT_SPEED_DEG_S)).kinematics
         start_rad = where_it_stands(devices, named)
-        guard = NearGuard.around(self.cell, start_rad, self.told)
+        guard = NearGuard.around(self.cell, start_rad, self.uncertainty)
         guard.check_surroundings()
         guide = self._guide(guard)
         result = record_plan(
@@ -128,16 +130,16 @@ class Bootstrap:
             watchers=watchers,
             guide=guide,
         )
-        told = guide.then if isinstance(guide, ProbingGuide) else guide
-        if result.finish not in _MOVED_THROUGH or told is None or told.knowledge is None:
+        finder = guide.then if isinstance(guide, ProbingGuide) else guide
+        if result.finish not in _MOVED_THROUGH or finder is None or finder.knowledge is None:
             return Bootstrapped(result)
-        return Bootstrapped(result, Found.of(told.knowledge, told.layout), told.refusal)
+        return Bootstrapped(result, Found.of(finder.knowledge, finder.layout), finder.refusal)
 
     def _guide(self, guard: NearGuard) -> BootstrapGuide | ProbingGuide:
         layout = self.cell.layout
         if layout is None:
-            return ProbingGuide(self.cell, guard, self.told)
-        return BootstrapGuide(self.cell, layout, guard, self.told)
+            return ProbingGuide(self.cell, guard, self.uncertainty)
+        return BootstrapGuide(self.cell, layout, guard, self.uncertainty)
 
     def _plan(self, start_rad: FloatArray, cell: CellFile) -> Plan:
         """The view from where the arm stands; the guide adds the others."""

@@ -146,9 +146,9 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
 def _values(solution: SolutionSource, law: LawSource | None) -> FloatArray:
     alpha, bend, beta = solution.alpha_px, 0.0, solution.beta_px
     if law is not None:
-        (alpha, bend), told = law.values(), solution.alpha_px
+        (alpha, bend), reported = law.values(), solution.alpha_px
         named = {_ALIASES.get(n): p.value for n, p in law.parameters.items()}
-        beta = named.get("beta", alpha * solution.beta_px / told)
+        beta = named.get("beta", alpha * solution.beta_px / reported)
     optics = [solution.u0_px, solution.v0_px, solution.skew_px]
     return np.array([alpha, beta, bend, *optics, *solution.distortion, *np.zeros(6)])
 

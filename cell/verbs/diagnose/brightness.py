@@ -15,7 +15,7 @@ _WHITE = 90.0
 _ABOUT_SAMPLES = 200
 _FEWEST = 8
 _CLEAR_SIGMA = 4.0
-_WORTH_TELLING = 0.02
+_WORTH_REPORTING = 0.02
 
 
 def white_level(image: NDArray[np.generic], corners_px: FloatArray) -> float:
@@ -57,9 +57,13 @@ def brightness_notes(recording: Recording, found: Diagnosis) -> tuple[str, ...]:
         return ()
     distance_m = evaluate(found.twin.model, views).distance_m
     order = np.arange(len(views), dtype=np.float64)
-    told = _trend(level, distance_m, "with the board's distance, from the nearest to the farthest")
-    told += _trend(level, order, "from the first frame to the last")
-    return told or (f"the board's white is the same in all pictures ({np.nanmedian(level):.0%})",)
+    reported = _trend(
+        level, distance_m, "with the board's distance, from the nearest to the farthest"
+    )
+    reported += _trend(level, order, "from the first frame to the last")
+    return reported or (
+        f"the board's white is the same in all pictures ({np.nanmedian(level):.0%})",
+    )
 
 
 def _trend(level: FloatArray, along: FloatArray, words: str) -> tuple[str, ...]:
@@ -73,6 +77,6 @@ def _trend(level: FloatArray, along: FloatArray, words: str) -> tuple[str, ...]:
     rest = y - y.mean() - slope * spread
     sigma = float(np.sqrt(rest @ rest / max(len(x) - 2, 1) / (spread @ spread)))
     change = slope * float(np.ptp(x))
-    if abs(slope) < _CLEAR_SIGMA * sigma or abs(change) < _WORTH_TELLING:
+    if abs(slope) < _CLEAR_SIGMA * sigma or abs(change) < _WORTH_REPORTING:
         return ()
     return (f"the board's white changes by {change:+.0%} {words}",)

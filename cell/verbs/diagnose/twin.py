@@ -89,7 +89,7 @@ def _pose(matrix: FloatArray) -> dict[str, Any]:
 
 
 def _views(views: Views) -> list[dict[str, Any]]:
-    told = []
+    reported = []
     for i in range(len(views)):
         view: dict[str, Any] = {"frame": int(views.frame[i])}
         view["base_from_flange"] = _pose(views.base_from_flange[i])
@@ -107,5 +107,5 @@ def _views(views: Views) -> list[dict[str, Any]]:
         words = {k: str(v[i]) for k, v in views.labels.items() if v[i]}
         if further or words:
             view["log"] = {**further, **words}
-        told.append(view)
-    return told
+        reported.append(view)
+    return reported

@@ -38,13 +38,15 @@ def _panel(robot: UniversalRobot) -> list[Finding]:
     except DeviceError as silent:
         return [Finding("UR controller", False, str(silent), CHECK_LINE)]
     try:
-        told = panel.identity()
+        reported = panel.identity()
         kind = "dashboard server"
-        if "robot_api" in told:
-            kind = f"PolyScope X, robot API {told['robot_api']}"
-        found = ", ".join(told[key] for key in ("polyscope", "model", "serial") if key in told)
+        if "robot_api" in reported:
+            kind = f"PolyScope X, robot API {reported['robot_api']}"
+        found = ", ".join(
+            reported[key] for key in ("polyscope", "model", "serial") if key in reported
+        )
         answers = Finding("UR controller", True, f"{kind}: {found or 'tells no version'}")
-        return [answers, _model(robot.model or "", told.get("model", "")), *_state(panel)]
+        return [answers, _model(robot.model or "", reported.get("model", "")), *_state(panel)]
     except DeviceError as silent:
         return [Finding("UR controller", False, str(silent), CHECK_LINE)]
     finally:
@@ -55,7 +57,7 @@ def _model(named: str, model: str) -> Finding:
     return Finding(
         "UR model",
         not model_differs(named, model),
-        f"{model or 'not told'}; the cell file says {named or 'nothing'}",
+        f"{model or 'not reported'}; the cell file says {named or 'nothing'}",
         "write the model that is connected at robot.model, and plan anew",
     )
 

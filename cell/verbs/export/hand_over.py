@@ -188,16 +188,16 @@ def _refuse_skew(found: SolutionSource, name: str, tool: str) -> None:
 def _warnings(
     calibration: CalibrationSource, name: str, distance_m: float | None
 ) -> tuple[str, ...]:
-    told: list[str] = []
+    reported: list[str] = []
     law, span = calibration.focus_law, calibration.range_m
     if law is not None and law.moves and moving_law(calibration, name) is None:
-        told.append(
+        reported.append(
             f"solution {name} has one focal length for all distances, but it follows the distance"
             f" by {law.law}: this camera is wrong nearly everywhere"
         )
     if distance_m is not None and span is not None and not span[0] <= distance_m <= span[1]:
-        told.append(
+        reported.append(
             f"--distance {distance_m:g} lies outside the calibrated range, {span[0]:.3f} to"
             f" {span[1]:.3f} m: the focal length there is an extrapolation"
         )
-    return tuple(told)
+    return tuple(reported)

@@ -168,7 +168,7 @@ def _import_pictures(
     if series:
         corners = _corners_of(header.board.board(), size_px, pictures, progress)
         posed = _posed(series, pictures, corners, header.board.board(), described)
-        header = header.model_copy(update={"imported": _told(header, posed)})
+        header = header.model_copy(update={"imported": _import_record(header, posed)})
         notes += posed.guessed
     else:
         notes += _no_poses(source)
@@ -313,7 +313,7 @@ def _header(source: Path, size_px: tuple[int, int], described: Described) -> Hea
     return Header.model_validate(data)
 
 
-def _told(header: Header, posed: _Posed) -> dict[str, Any]:
+def _import_record(header: Header, posed: _Posed) -> dict[str, Any]:
     """What `recording.yaml` says of where the recording came from."""
     known = dict((header.model_extra or {})["imported"])
     read = posed.convention

@@ -94,9 +94,9 @@ def _sigma(expected: Expected, frame: str, axes: tuple[str, ...]) -> FloatArray:
 
 def as_mapping(found: ExpectedUncertainty) -> dict[str, Any]:
     """For `--json`."""
-    told = asdict(found)
-    told["duration"]["whole_s"] = found.duration.whole_s
-    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in told.items()}
+    reported = asdict(found)
+    reported["duration"]["whole_s"] = found.duration.whole_s
+    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in reported.items()}
 
 
 def as_lines(found: ExpectedUncertainty) -> list[str]:

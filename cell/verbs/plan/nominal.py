@@ -26,15 +26,15 @@ _STANDS = ("fixed", "manual")
 
 def assumed_noise(cell: CellFile) -> tuple[Noise, str]:
     """Noise levels to plan with, and where they are from."""
-    told = cell.simulation.noise if cell.simulation else None
-    if told is None:
+    reported = cell.simulation.noise if cell.simulation else None
+    if reported is None:
         return USUAL_NOISE, "assumed; the cell file does not tell"
     noise = Noise(
-        corner_px=told.corner_px or USUAL_NOISE.corner_px,
-        flange_m=told.arm_position_m or USUAL_NOISE.flange_m,
-        flange_rad=told.arm_rotation_rad or USUAL_NOISE.flange_rad,
+        corner_px=reported.corner_px or USUAL_NOISE.corner_px,
+        flange_m=reported.arm_position_m or USUAL_NOISE.flange_m,
+        flange_rad=reported.arm_rotation_rad or USUAL_NOISE.flange_rad,
     )
-    levels = (told.corner_px, told.arm_position_m, told.arm_rotation_rad)
+    levels = (reported.corner_px, reported.arm_position_m, reported.arm_rotation_rad)
     return noise, "simulation.noise" if all(levels) else "simulation.noise, zeros as usual"
 
 

@@ -109,10 +109,12 @@ def as_shares(found: PlanPower) -> dict[str, float | None]:
 def as_lines(found: PlanPower) -> list[str]:
     """The short of it, for people."""
     power, shares = found.power, as_shares(found)
-    told = ", ".join("{} {}".format(k, "-" if v is None else f"{v:.2g}") for k, v in shares.items())
+    reported = ", ".join(
+        "{} {}".format(k, "-" if v is None else f"{v:.2g}") for k, v in shares.items()
+    )
     missed = [e.effect.label for e in power.effects if not e.detected]
     pairs = [f"{first.effect.label} and {rival.label}" for first, rival in alike(power)]
-    words = f"effects it would reveal, at this share of their usual size: {told}"
+    words = f"effects it would reveal, at this share of their usual size: {reported}"
     lines = fill(words, _WIDTH, subsequent_indent="  ").splitlines()
     if missed:
         lines.append(f"missed at their usual size: {', '.join(missed)}")

@@ -56,8 +56,8 @@ def _seconds(joints: FloatArray, guard: Guard) -> FloatArray:
         for b in range(a):
             allowed = bool((np.abs(joints[a] - joints[b]) <= _MOST_TURN_RAD).all())
             allowed = allowed and guard.may_move(joints[a], joints[b])
-            told = guard.move_time_s(joints[a], joints[b]) if allowed else _NEVER_S
-            seconds[a, b] = seconds[b, a] = told
+            reported = guard.move_time_s(joints[a], joints[b]) if allowed else _NEVER_S
+            seconds[a, b] = seconds[b, a] = reported
     return seconds
 
 

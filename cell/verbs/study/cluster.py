@@ -108,14 +108,14 @@ def _check(client: Client, scheduler: str) -> None:
             f"--scheduler {scheduler}: has no workers; start `dask worker {scheduler}` where they"
             " shall work"
         ) from None
-    here, told = version(PACKAGE), _versions(client)
-    for who, theirs in told.items():
+    here, reported = version(PACKAGE), _versions(client)
+    for who, theirs in reported.items():
         if theirs != here:
             raise DeviceUnreachable(
                 f"--scheduler {scheduler}: scheduler and workers need {PACKAGE}[study] {here}, as"
                 f" here; {who} has: {theirs}"
             )
-    if len(told) == 1:
+    if len(reported) == 1:
         raise DeviceUnreachable(
             f"--scheduler {scheduler}: none of its workers answered in {_WORKER_S:.0f} s: all at"
             f" other work, or their Python or `distributed` differ from {_dask_here()} here"
@@ -146,13 +146,13 @@ def _versions(client: Client) -> dict[str, str]:
         for worker in client.nthreads()
     }
     until = time.monotonic() + _WORKER_S
-    told = {"the scheduler": client.run_on_scheduler(theirs, PACKAGE)}
+    reported = {"the scheduler": client.run_on_scheduler(theirs, PACKAGE)}
     for worker, future in asked.items():
         try:
-            told[worker] = future.result(timeout=max(until - time.monotonic(), 0.1))
+            reported[worker] = future.result(timeout=max(until - time.monotonic(), 0.1))
         except TimeoutError:
             pass
         except Exception as error:
-            told[worker] = f"failed: {type(error).__name__}: {error}"
+            reported[worker] = f"failed: {type(error).__name__}: {error}"
     client.cancel(list(asked.values()))
-    return told
+    return reported

@@ -68,8 +68,10 @@ class Estimate:
 
 def of_calibration(found: Calibration, trial: Trial) -> list[Estimate]:
     """Every solution's camera and camera positions, and the robot's two transforms."""
-    told = [e for name, s in found.solutions.items() for e in _of_solution(name, s, found, trial)]
-    return [*told, *_of_robot(found, trial)]
+    reported = [
+        e for name, s in found.solutions.items() for e in _of_solution(name, s, found, trial)
+    ]
+    return [*reported, *_of_robot(found, trial)]
 
 
 def of_effect(found: NamedEffect, trial: Trial) -> list[Estimate]:
@@ -81,8 +83,8 @@ def of_effect(found: NamedEffect, trial: Trial) -> list[Estimate]:
         for name, value in present.as_mapping().items()
     }
     return [
-        Estimate(found.name, name, told.value, told.sigma or None, truth[name])
-        for name, told in found.parameters.items()
+        Estimate(found.name, name, reported.value, reported.sigma or None, truth[name])
+        for name, reported in found.parameters.items()
         if name in truth
     ]
 
@@ -147,7 +149,9 @@ def _of_robot(found: Calibration, trial: Trial) -> Iterator[Estimate]:
         (model.flange_from_mounted, robot.flange_from_mounted),
         (model.base_from_fixed, robot.base_from_fixed),
     )
-    off = np.concatenate([rigid.to_vector(rigid.inverse(true) @ told) for true, told in pairs])
+    off = np.concatenate(
+        [rigid.to_vector(rigid.inverse(true) @ reported) for true, reported in pairs]
+    )
     axes = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
     labels = [f"{name}.{axis}" for name in names for axis in axes]
     for label, value, one in zip(labels, off.tolist(), sigma.tolist(), strict=True):

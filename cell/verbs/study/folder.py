@@ -32,7 +32,7 @@ from cell.verbs.study.work import FAILED
 
 MANIFEST, RESULTS, FAILURES, LOCK = "study.json", "results", "failures", ".lock"
 SCHEMA = "cell.study-results/2"
-_TOLD = 3
+_SHOWN_AT_MOST = 3
 
 
 class _Table:
@@ -160,11 +160,11 @@ def _same_study(path: Path, study: Study) -> None:
         )
     changed = _changed(before, json.loads(json.dumps(now)))
     if changed:
-        more = f" and {len(changed) - _TOLD} more" if len(changed) > _TOLD else ""
+        more = f" and {len(changed) - _SHOWN_AT_MOST} more" if len(changed) > _SHOWN_AT_MOST else ""
         raise InputError(
             f"{study.path}: is not the study that {path} was begun with; changed:"
-            f" {', '.join(changed[:_TOLD])}{more}. Its results stand beside the new ones only in"
-            " another folder: give another -o, or take the change back."
+            f" {', '.join(changed[:_SHOWN_AT_MOST])}{more}. Its results stand beside the new ones"
+            " only in another folder: give another -o, or take the change back."
         )
 
 

@@ -23,7 +23,7 @@ def rate(hits: Sequence[bool]) -> dict[str, Any]:
     }
 
 
-def told(rate: dict[str, Any]) -> str:
+def as_percent(rate: dict[str, Any]) -> str:
     """A rate for people: the share, and its interval."""
     if not rate["runs"]:
         return "-"

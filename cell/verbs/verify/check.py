@@ -133,8 +133,8 @@ def check(
 def _same_camera(old: OldCell, views: Views) -> None:
     size = (views.width_px, views.height_px)
     if size != old.image_size_px:
-        told = " and ".join(f"{w} x {h}" for w, h in (old.image_size_px, size))
-        raise InputError(f"calibration and recording are of images of {told}: not the same camera")
+        sizes = " and ".join(f"{w} x {h}" for w, h in (old.image_size_px, size))
+        raise InputError(f"calibration and recording are of images of {sizes}: not the same camera")
     if views.mount != old.mount:
         raise InputError(
             f"the calibration is of {old.mount}, the recording says mount: {views.mount}"
@@ -179,11 +179,11 @@ def _left_out(
 
 
 def _mount(old: OldCell, found: Judgement) -> MountPart | None:
-    told = found.told
-    at = np.flatnonzero(np.isin(told.at, old.group("mount")))
+    explanation = found.explanation
+    at = np.flatnonzero(np.isin(explanation.at, old.group("mount")))
     if len(at) != 6:
         return None
-    values, sigma = told.values[at], np.sqrt(np.diag(told.covariance)[at])
+    values, sigma = explanation.values[at], np.sqrt(np.diag(explanation.covariance)[at])
     return MountPart(
         shift_m=tuple(values[:3]),
         sigma_shift_m=tuple(sigma[:3]),
@@ -193,17 +193,19 @@ def _mount(old: OldCell, found: Judgement) -> MountPart | None:
 
 
 def _alpha(old: OldCell, found: Judgement, misfit: Misfit) -> tuple[AlphaPart, ...]:
-    told = found.told
-    lens = np.flatnonzero(np.isin(told.at, old.group("lens")))
+    explanation = found.explanation
+    lens = np.flatnonzero(np.isin(explanation.at, old.group("lens")))
     if not len(lens):
         return ()
     near, far = float(misfit.distance_m.min()), float(misfit.distance_m.max())
     parts = []
     for distance in np.geomspace(near, far, _ALPHA_DISTANCES):
-        before = _scale_px(old, np.zeros(len(lens)), told.at[lens], float(distance))
-        change = _scale_px(old, told.values[lens], told.at[lens], float(distance)) - before
-        gradient = _gradient(old, told.at[lens], float(distance))
-        variance = float(gradient @ told.covariance[np.ix_(lens, lens)] @ gradient)
+        before = _scale_px(old, np.zeros(len(lens)), explanation.at[lens], float(distance))
+        change = (
+            _scale_px(old, explanation.values[lens], explanation.at[lens], float(distance)) - before
+        )
+        gradient = _gradient(old, explanation.at[lens], float(distance))
+        variance = float(gradient @ explanation.covariance[np.ix_(lens, lens)] @ gradient)
         parts.append(
             AlphaPart(
                 distance_m=float(distance),

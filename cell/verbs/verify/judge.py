@@ -96,7 +96,7 @@ class Judgement:
     both: Change
 
     @property
-    def told(self) -> Change:
+    def explanation(self) -> Change:
         """The explanation that goes with the verdict; all three where it is still good."""
         found = {"moved": self.moved, "lens_changed": self.lens}
         return found.get(self.verdict, self.both)
@@ -125,7 +125,7 @@ def judge(old: OldCell, views: Views) -> Judgement:
     still, moved, lens, both = by(), by("mount"), by("lens"), by("mount", "lens")
     p_value = _p(still, both)
     verdict, because = _verdict(p_value, moved, lens, both)
-    free, told = {
+    free, explanation = {
         "good": ((), still),
         "moved": (("mount",), moved),
         "lens_changed": (("lens",), lens),
@@ -133,7 +133,7 @@ def judge(old: OldCell, views: Views) -> Judgement:
     unmoved = explain(old, views, weight, noise, free)
     return Judgement(
         views, weight, wrong, noise, ratio, arm_p, p_value, verdict, because,
-        _board(old, unmoved, told), still, moved, lens, both,
+        _board(old, unmoved, explanation), still, moved, lens, both,
     )  # fmt: skip
 
 
@@ -208,13 +208,13 @@ def _verdict(p_value: float, moved: Change, lens: Change, both: Change) -> tuple
     return "moved_and_lens_changed", "neither explains these views alone"
 
 
-def _board(old: OldCell, unmoved: Change, told: Change) -> Board:
+def _board(old: OldCell, unmoved: Change, explanation: Change) -> Board:
     """The board's place by the explanation that holds, against one with the board in its old."""
     held = old.mount == "eye_in_hand"
-    now = told.model.base_from_fixed if held else told.model.flange_from_mounted
+    now = explanation.model.base_from_fixed if held else explanation.model.flange_from_mounted
     shift = to_vector(inverse(board_before(old)) @ now)
     far, turn = float(np.linalg.norm(shift[:3])), float(np.linalg.norm(shift[3:]))
     if far > _FAR_M or turn > _FAR_RAD:
         return Board(True, 0.0, far, turn)
-    p_value = _p(unmoved, told)
+    p_value = _p(unmoved, explanation)
     return Board(p_value < SIGNIFICANT, p_value, far, turn)

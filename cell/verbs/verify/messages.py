@@ -116,16 +116,16 @@ def _shift(mount: MountPart | None) -> str:
 
 
 def _vector(values: np.ndarray, sigma: np.ndarray) -> str:
-    told = ", ".join(f"{v:+.3f} ± {s:.3f}" for v, s in zip(values, sigma, strict=True))
-    return f"{np.linalg.norm(values):.2f} ({told})"
+    listed = ", ".join(f"{v:+.3f} ± {s:.3f}" for v, s in zip(values, sigma, strict=True))
+    return f"{np.linalg.norm(values):.2f} ({listed})"
 
 
 def _alpha(alpha: tuple[AlphaPart, ...]) -> str:
-    told = ", ".join(
+    listed = ", ".join(
         f"{a.change_px:+.2f} ± {a.sigma_px:.2f} px at {a.distance_m:.3f} m" for a in alpha
     )
     share = alpha[len(alpha) // 2]
-    return f"alpha differs by {told} ({1e2 * share.change_px / share.alpha_px:+.3f} %)"
+    return f"alpha differs by {listed} ({1e2 * share.change_px / share.alpha_px:+.3f} %)"
 
 
 def _length(found: VerifyFile) -> str:

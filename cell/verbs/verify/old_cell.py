@@ -123,8 +123,8 @@ def _optics(found: SolutionSource) -> FloatArray:
     named |= dict(zip(DISTORTION, found.distortion, strict=True))
     named |= {"alpha_px": found.alpha_px, "beta_px": found.beta_px}
     if found.focus is not None:
-        told = found.focus.parameters
-        named |= {_FAR[name]: p.value for name, p in told.items() if name in _FAR}
+        reported = found.focus.parameters
+        named |= {_FAR[name]: p.value for name, p in reported.items() if name in _FAR}
     return optics_row(**named)
 
 

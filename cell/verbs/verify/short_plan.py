@@ -92,14 +92,14 @@ def choose_views(old: OldCell, log: Views, count: int) -> NDArray[np.int64]:
             f"only {len(possible)} of the plan's {len(log)} views show the whole board by the old"
             f" calibration, {count} are asked for: was it made with this cell and plan?"
         )
-    told = pose_information(old.model, log.take(possible), (), old.noise)
-    gathered = np.diag([wide(old.model, unknown) ** -2.0 for unknown in told.unknowns])
+    reported = pose_information(old.model, log.take(possible), (), old.noise)
+    gathered = np.diag([wide(old.model, unknown) ** -2.0 for unknown in reported.unknowns])
     chosen: list[int] = []
     for _ in range(count):
-        gain = np.array([np.linalg.slogdet(gathered + one)[1] for one in told.frames])
+        gain = np.array([np.linalg.slogdet(gathered + one)[1] for one in reported.frames])
         gain[chosen] = -np.inf
         chosen.append(int(gain.argmax()))
-        gathered = gathered + told.frames[chosen[-1]]
+        gathered = gathered + reported.frames[chosen[-1]]
     return np.sort(possible[chosen])
 
 

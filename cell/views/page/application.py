@@ -144,8 +144,8 @@ class Page:
         parts = dict(self._live.parts)
         new = {name: p for name, p in parts.items() if sent.get(name) != p.version}
         sent.update({name: part.version for name, part in new.items()})
-        told = [_event(name, part.content) for name, part in new.items()]
-        return "".join([*told, _event("now", self._live.now())])
+        reported = [_event(name, part.content) for name, part in new.items()]
+        return "".join([*reported, _event("now", self._live.now())])
 
     # -- what is asked ---------------------------------------------------------------------------
 

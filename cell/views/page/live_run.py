@@ -70,8 +70,8 @@ class LiveRun(Watcher):
 
     # -- the run's side: quick, from its own threads -------------------------------------------
 
-    def told(self, status: Status) -> None:
-        """See `Watcher.told`."""
+    def status_changed(self, status: Status) -> None:
+        """See `Watcher.status_changed`."""
         self.status = status
         if status.event:
             self.say(status.event)
@@ -118,8 +118,8 @@ class LiveRun(Watcher):
     def ended(self, words: str, files: Mapping[str, str]) -> None:
         """The program's last words, and the files it wrote, by what they are."""
         self.over = True
-        told = dict(self.parts["end"].content) if "end" in self.parts else {"words": words}
-        self._set("end", told | {"result": words, "files": dict(files), "final": True})
+        ended = dict(self.parts["end"].content) if "end" in self.parts else {"words": words}
+        self._set("end", ended | {"result": words, "files": dict(files), "final": True})
 
     # -- the page's side -------------------------------------------------------------------------
 

@@ -15,9 +15,9 @@ def text(found: Sequence[Placement]) -> str:
 def command(placement: Placement) -> str:
     """The ROS 2 command that publishes the transform."""
     values = zip(("x", "y", "z", "qx", "qy", "qz", "qw"), _numbers(placement), strict=True)
-    told = " ".join(f"--{name} {value}" for name, value in values)
+    reported = " ".join(f"--{name} {value}" for name, value in values)
     return (
-        f"ros2 run tf2_ros static_transform_publisher {told}"
+        f"ros2 run tf2_ros static_transform_publisher {reported}"
         f" --frame-id {placement.parent_name} --child-frame-id {placement.child_name}"
     )
 

@@ -106,7 +106,7 @@ class Estimator:
             )
         except CalibrationError as error:
             return Estimate.none(len(chosen), str(error))
-        return self._told(len(chosen), fit)
+        return self._estimate(len(chosen), fit)
 
     def _views(self, chosen: tuple[FrameRecord, ...]) -> Views:
         numbers = [frame.frame for frame in chosen]
@@ -116,7 +116,7 @@ class Estimator:
         recording = Recording(Path(), header, chosen)
         return same_order_everywhere(recording.views(Corners(px, sigma_px)))
 
-    def _told(self, frames: int, fit: RunningFit) -> Estimate:
+    def _estimate(self, frames: int, fit: RunningFit) -> Estimate:
         board = self._plan.cell.board.board()
         planned = Sights.of(fit.camera_from_board(self._planned), board)
         logged = fit.views.base_from_flange[fit.taken]

@@ -119,9 +119,9 @@ class RunningEstimate(Watcher):
     def _receive(self) -> None:
         try:
             while True:
-                told = self._link.recv()
-                if isinstance(told, Estimate):
-                    self._tell(told)
+                reported = self._link.recv()
+                if isinstance(reported, Estimate):
+                    self._publish(reported)
                 elif self._goal is not None:
                     self._goal.catch_up()
         except (EOFError, OSError):
@@ -131,7 +131,7 @@ class RunningEstimate(Watcher):
             if self._goal is not None:
                 self._goal.catch_up()
 
-    def _tell(self, estimate: Estimate) -> None:
+    def _publish(self, estimate: Estimate) -> None:
         for heard in tuple(self._heard):
             try:
                 heard(estimate)

@@ -37,7 +37,7 @@ class _Bar(Watcher):
     bar: Progress
     task: TaskID
 
-    def told(self, status: Status) -> None:
+    def status_changed(self, status: Status) -> None:
         self.bar.update(
             self.task,
             total=status.total,
@@ -50,7 +50,7 @@ class _Bar(Watcher):
 
 
 class _Plainly(Watcher):
-    def told(self, status: Status) -> None:
+    def status_changed(self, status: Status) -> None:
         if status.event:
             done = f"[{status.done + status.skipped}/{status.total}]"
             sys.stderr.write(f"{done} {status.event}, {_clock(status.left_s)} left\n")
@@ -68,7 +68,7 @@ def counted_progress(what: str) -> Iterator[Callable[[int, int], None]]:
     with Progress(console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None)
 
-        def tell(done: int, total: int) -> None:
+        def report_progress(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)
 
-        yield tell
+        yield report_progress

@@ -81,8 +81,12 @@ class PanelServices:
         if method == "POST":
             signals[name] = float(values["lvalue"])
             return DONE
-        told = {"name": name.rpartition("/")[2], "lvalue": f"{signals[name]:g}", "lstate": "normal"}
-        return state({"_type": "ios-signal", "_title": name, **told})
+        reported = {
+            "name": name.rpartition("/")[2],
+            "lvalue": f"{signals[name]:g}",
+            "lstate": "normal",
+        }
+        return state({"_type": "ios-signal", "_title": name, **reported})
 
     def _data(self, method: str, name: str, values: dict[str, str]) -> Answer:
         watch = self._controller.watch

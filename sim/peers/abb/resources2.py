@@ -109,8 +109,8 @@ class Resources2:
             value = self._data(path)
             if value is not None:
                 return state({"_type": "rap-data", "value": value})
-        tell = self._gets.get(path)
-        return tell() if tell else error(404, -1073445865, "No such resource")
+        answer = self._gets.get(path)
+        return answer() if answer else error(404, -1073445865, "No such resource")
 
     def _edit(self, path: str, values: dict[str, str], client: str) -> Answer:
         """What needs the mastership of the domain edit."""

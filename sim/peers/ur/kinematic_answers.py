@@ -43,15 +43,17 @@ class KinematicAnswers:
     def __init__(self, controller: Controller, registers: ScriptRegisters) -> None:
         self._controller, self._registers = controller, registers
         self.actions: dict[int, Callable[[], None]] = {
-            FORWARD_NOW: lambda: self._tell_forward(controller.joints_rad(), controller.tcp_offset),
-            FORWARD: lambda: self._tell_forward(registers.in_doubles(0), registers.in_doubles(6)),
-            FLANGE_POSE: lambda: self._tell_forward(controller.joints_rad(), _TOOL0),
+            FORWARD_NOW: lambda: self._answer_forward(
+                controller.joints_rad(), controller.tcp_offset
+            ),
+            FORWARD: lambda: self._answer_forward(registers.in_doubles(0), registers.in_doubles(6)),
+            FLANGE_POSE: lambda: self._answer_forward(controller.joints_rad(), _TOOL0),
             INVERSE: lambda: registers.set_out_doubles(self._inverse(controller.joints_rad())),
             INVERSE_NEAR: lambda: registers.set_out_doubles(self._inverse(registers.in_doubles(6))),
-            HAS_INVERSE: self._tell_reachable,
-            HAS_INVERSE_NEAR: self._tell_reachable,
-            POSE_WITHIN_LIMITS: self._tell_reachable,
-            JOINTS_WITHIN_LIMITS: self._tell_within_limits,
+            HAS_INVERSE: self._answer_reachable,
+            HAS_INVERSE_NEAR: self._answer_reachable,
+            POSE_WITHIN_LIMITS: self._answer_reachable,
+            JOINTS_WITHIN_LIMITS: self._answer_within_limits,
         }
 
     def forward(self, joints_rad: tuple[float, ...]) -> RigidTransform:
@@ -64,7 +66,7 @@ class KinematicAnswers:
             raise NoSolution("this controller was given no kinematics")
         return self._controller.kinematics
 
-    def _tell_forward(self, joints_rad: tuple[float, ...], offset: tuple[float, ...]) -> None:
+    def _answer_forward(self, joints_rad: tuple[float, ...], offset: tuple[float, ...]) -> None:
         self._registers.set_out_doubles(pose_of(base_from_tcp(self.forward(joints_rad), offset)))
 
     def _inverse(self, near_rad: tuple[float, ...]) -> tuple[float, ...]:
@@ -75,7 +77,7 @@ class KinematicAnswers:
             raise NoSolution(str(far)) from None
         return tuple(found.tolist())
 
-    def _tell_reachable(self) -> None:
+    def _answer_reachable(self) -> None:
         try:
             self._inverse(self._controller.joints_rad())
         except NoSolution:
@@ -83,6 +85,6 @@ class KinematicAnswers:
         else:
             self._registers.set_out(1, 1)
 
-    def _tell_within_limits(self) -> None:
+    def _answer_within_limits(self) -> None:
         joints = np.array(self._registers.in_doubles(0))
         self._registers.set_out(1, int(self._kinematics.within_limits(joints)))

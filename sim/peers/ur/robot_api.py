@@ -111,7 +111,7 @@ class _Api:
     def __init__(self, controller: Controller, api_version: str) -> None:
         self._controller = controller
         self._version = api_version
-        tells: dict[str, Callable[[], dict[str, Any]]] = {
+        answers: dict[str, Callable[[], dict[str, Any]]] = {
             "/openapi.json": lambda: {
                 "openapi": "3.1.0",
                 "info": {"title": "Robot API", "version": api_version},
@@ -131,7 +131,7 @@ class _Api:
                 "serialNumber": "20255500001",
             },
         }
-        self._tells = tells | (later if self._knows_later() else {})
+        self._answers = answers | (later if self._knows_later() else {})
         self._states: dict[str, Callable[[], Reply]] = {
             "POWER_ON": lambda: self._power(Robot.IDLE),
             "POWER_OFF": lambda: self._power(Robot.POWER_OFF),
@@ -151,8 +151,8 @@ class _Api:
 
     def answer(self, verb: str, path: str, body: bytes) -> Reply:
         if verb == "GET":
-            tell = self._tells.get(path)
-            return (200, tell()) if tell else _missing(path)
+            answer = self._answers.get(path)
+            return (200, answer()) if answer else _missing(path)
         orders = {"/robotstate/v1/state": self._states, "/program/v1/state": self._programs}
         if verb == "DELETE" and path.startswith("/popup/v1") and self._knows_later():
             return 200, {"message": "Popup closed"}
@@ -222,10 +222,10 @@ class _Handler(BaseHTTPRequestHandler):
         body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
         while self.api.faults().deaf:
             time.sleep(_POLL_S)
-        status, told = self.api.answer(verb, self.path.removeprefix(BASE), body)
+        status, reported = self.api.answer(verb, self.path.removeprefix(BASE), body)
         while self.api.faults().mute:
             time.sleep(_POLL_S)
-        content = json.dumps(told).encode()
+        content = json.dumps(reported).encode()
         self.send_response(status)
         self.send_header("Content-Type", "application/json")
         self.send_header("Content-Length", str(len(content)))

@@ -144,7 +144,7 @@ def test_a_controller_that_falls_silent_holds_nobody_up_and_is_told():
         assert time.monotonic() - begin_s < 0.1
         durations_s = []
 
-        def told():
+        def failing():
             call_s = time.monotonic()
             try:
                 arm.state()
@@ -154,7 +154,7 @@ def test_a_controller_that_falls_silent_holds_nobody_up_and_is_told():
                 durations_s.append(time.monotonic() - call_s)
             return False
 
-        assert until(told)
+        assert until(failing)
         assert np.median(durations_s) < 0.05
         controller.faults.mend_cable()
 

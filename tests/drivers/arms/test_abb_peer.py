@@ -61,8 +61,8 @@ def test_mastership_is_held_by_one_client_at_a_time():
         other = RWS(controller.url)
         with pytest.raises(ABBException, match="held"):
             other._do_post("rw/mastership?action=request")
-        [told] = rws._do_get("rw/mastership/motion")["_embedded"]["_state"]
-        assert told["mastership"] == "remote"
+        [reported] = rws._do_get("rw/mastership/motion")["_embedded"]["_state"]
+        assert reported["mastership"] == "remote"
         rws._do_post("rw/mastership/motion?action=release")
         other._do_post("rw/mastership?action=request")
 
@@ -70,8 +70,8 @@ def test_mastership_is_held_by_one_client_at_a_time():
 def test_remote_mastering_is_granted_in_automatic_mode():
     with client() as (rws, _):
         rws._do_post("users/rmmp?json=1", {"privilege": "modify"})
-        [told] = rws._do_get("users/rmmp/poll")["_embedded"]["_state"]
-        assert told["status"] == "GRANTED"
+        [reported] = rws._do_get("users/rmmp/poll")["_embedded"]["_state"]
+        assert reported["status"] == "GRANTED"
 
 
 def test_the_ram_disk_has_files_under_either_of_its_names():

@@ -98,7 +98,7 @@ def test_a_stop_that_is_refused_by_every_path_is_told():
     with moving() as (arm, controller, _):
         controller.faults.stops = Stops.REFUSED
 
-        def told():
+        def failing():
             try:
                 arm.stop()  # which waits for an answer for a moment only
                 arm.state()
@@ -106,7 +106,7 @@ def test_a_stop_that_is_refused_by_every_path_is_told():
                 return "refuses" in str(failed) or "still moves" in str(failed)
             return False
 
-        assert until(told)
+        assert until(failing)
 
 
 def test_a_guard_stop_is_told_with_what_to_do():

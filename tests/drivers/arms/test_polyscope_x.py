@@ -50,13 +50,13 @@ def test_polyscope_5_and_x_are_told_apart_by_what_answers():
 
 
 @pytest.mark.parametrize(
-    ("version", "told"),
+    ("version", "reported"),
     [("5.0.107", {"robot_api", "polyscope", "model", "serial"}), ("3.1.6", {"robot_api"})],
 )
-def test_what_a_version_does_not_tell_is_left_out(version, told):
+def test_what_a_version_does_not_tell_is_left_out(version, reported):
     with polyscope_x(robot_api_version=version) as (controller, _):
         identity = panel_of(controller.address, ROBOT_API_PORT).identity()
-    assert set(identity) == told
+    assert set(identity) == reported
     assert identity.get("model", "UR5") == "UR5"
 
 

@@ -147,13 +147,13 @@ def test_the_factory_kinematics_are_read_and_put_the_flange_where_the_controller
         assert read_kinematics(controller.address, timeout_s=0.3) is None
 
 
-@pytest.mark.parametrize("told", [True, False], ids=["kinematics told", "not told"])
-def test_the_flange_never_exceeds_its_speed_in_a_joint_move(told):
+@pytest.mark.parametrize("reported", [True, False], ids=["kinematics told", "not told"])
+def test_the_flange_never_exceeds_its_speed_in_a_joint_move(reported):
     with ur_peer() as (controller, sim):
-        controller.kinematics = controller.kinematics if told else None
+        controller.kinematics = controller.kinematics if reported else None
         arm = URArm(controller.address)
         arm.connect()
-        goal = (UR_HOME[0] + (0.2 if told else 0.05), *UR_HOME[1:])
+        goal = (UR_HOME[0] + (0.2 if reported else 0.05), *UR_HOME[1:])
         arm.start_move(at_speed(goal, 0.05))
         speeds = []
         while arm.state().motion is Motion.MOVING:
@@ -163,4 +163,4 @@ def test_the_flange_never_exceeds_its_speed_in_a_joint_move(told):
             time.sleep(0.01)
         arm.close()
         assert max(speeds) <= 0.05 * 1.01
-        assert max(speeds) > (0.045 if told else 0.005)
+        assert max(speeds) > (0.045 if reported else 0.005)

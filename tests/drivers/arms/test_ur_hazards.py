@@ -225,13 +225,13 @@ def test_faults_at_random_instants_leave_the_arm_standing_and_are_told(seed):
         time.sleep(chance.uniform(0.0, 0.5))
         fault(controller, arm)
 
-        def told():
+        def failing():
             try:
                 return bool(arm.state().fault)
             except DeviceUnreachable as error:
                 return "connect again" in str(error)
 
-        assert until(told), fault.__name__
+        assert until(failing), fault.__name__
         assert halts_short_of(sim, UR_FAR), fault.__name__
         assert stays(sim, 0.3)
 

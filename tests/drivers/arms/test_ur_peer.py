@@ -87,7 +87,7 @@ from rtde_receive import RTDEReceiveInterface
 receive = RTDEReceiveInterface(sys.argv[1])
 control = RTDEControlInterface(sys.argv[1])
 q, pose = receive.getActualQ(), receive.getActualTCPPose()
-told = {
+reported = {
     "q": q, "pose": pose,
     "forward": control.getForwardKinematics(q, [0.0] * 6),
     "forward now": control.getForwardKinematics(),
@@ -104,7 +104,7 @@ told = {
     "inverse of far": control.getInverseKinematics([9.0, 9.0, 9.0, 0.0, 0.0, 0.0], q),
     "runs after it": control.isProgramRunning(),
 }
-print(json.dumps(told), flush=True)
+print(json.dumps(reported), flush=True)
 os._exit(0)
 """
 
@@ -114,16 +114,16 @@ from dashboard_client import DashboardClient
 
 dashboard = DashboardClient(sys.argv[1])
 dashboard.connect(2000)
-told = {"model": dashboard.getRobotModel(), "safetymode": dashboard.safetymode()}
+reported = {"model": dashboard.getRobotModel(), "safetymode": dashboard.safetymode()}
 for order in ("powerOff", "powerOn", "brakeRelease", "closePopup", "closeSafetyPopup", "stop"):
     getattr(dashboard, order)()  # raises where the answer is not the one that it waits for
-    told[order] = dashboard.robotmode()
+    reported[order] = dashboard.robotmode()
 dashboard.popup("hello")
 dashboard.addToLog("hello")
 dashboard.restartSafety()
 dashboard.quit()
-told["quit"] = True
-print(json.dumps(told), flush=True)
+reported["quit"] = True
+print(json.dumps(reported), flush=True)
 os._exit(0)
 """
 
@@ -137,42 +137,42 @@ def answers_of(script, address):
 
 def test_the_wheels_receive_client_gets_every_variable_that_it_asks_for_by_default():
     with ur_peer() as (controller, sim):
-        told = answers_of(_RECEIVE_ALL, controller.address)
+        reported = answers_of(_RECEIVE_ALL, controller.address)
         torques = controller.kinematics.gravity_torques(sim.truth().joints_rad)
-    assert len(told) > 40
-    assert told["getTargetQ"] == pytest.approx(UR_HOME)
-    assert told["getTargetMoment"] == pytest.approx(torques.tolist())
-    assert told["getSafetyMode"] == 1
-    assert told["getJointMode"] == [253] * 6
-    assert sum(v * v for v in told["getActualToolAccelerometer"]) == pytest.approx(9.80665**2)
+    assert len(reported) > 40
+    assert reported["getTargetQ"] == pytest.approx(UR_HOME)
+    assert reported["getTargetMoment"] == pytest.approx(torques.tolist())
+    assert reported["getSafetyMode"] == 1
+    assert reported["getJointMode"] == [253] * 6
+    assert sum(v * v for v in reported["getActualToolAccelerometer"]) == pytest.approx(9.80665**2)
 
 
 def test_the_wheels_control_client_is_told_kinematics_and_arrives_where_it_is():
     with ur_peer() as (controller, _):
         controller.tcp_offset = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        told = answers_of(_CONTROL, controller.address)
+        reported = answers_of(_CONTROL, controller.address)
         assert controller.payload_kg == 1.5
     for name in ("forward", "forward now"):
-        assert told[name] == pytest.approx(told["pose"], abs=1e-9)
+        assert reported[name] == pytest.approx(reported["pose"], abs=1e-9)
     for name in ("inverse", "inverse now"):
-        assert told[name] == pytest.approx(told["q"], abs=1e-9)
+        assert reported[name] == pytest.approx(reported["q"], abs=1e-9)
     true = ("reachable", "pose allowed", "payload")
     moves = ("moveL to where it is", "moveJ to where it is", "moveL_FK")
-    assert all(told[name] for name in (*true, *moves)), told
-    assert not told["far"]
-    assert not told["joints allowed"]
+    assert all(reported[name] for name in (*true, *moves)), reported
+    assert not reported["far"]
+    assert not reported["joints allowed"]
     # URScript's get_inverse_kin ends the program where there is no solution
-    assert told["inverse of far"] == []
-    assert told["runs after it"] is False
+    assert reported["inverse of far"] == []
+    assert reported["runs after it"] is False
 
 
 @pytest.mark.parametrize(("model", "named"), [("ur5e", "UR5"), ("ur10", "UR10"), ("ur3e", "UR3")])
 def test_the_dashboard_names_the_arm_that_it_moves_and_knows_the_wheels_orders(model, named):
     with ur_peer(model) as (controller, _):
-        told = answers_of(_DASHBOARD, controller.address)
-    assert told["model"] == named
-    assert "NORMAL" in told["safetymode"]
-    assert "POWER_OFF" in told["powerOff"]
-    assert "IDLE" in told["powerOn"]
-    assert "RUNNING" in told["brakeRelease"]
-    assert told["quit"] is True
+        reported = answers_of(_DASHBOARD, controller.address)
+    assert reported["model"] == named
+    assert "NORMAL" in reported["safetymode"]
+    assert "POWER_OFF" in reported["powerOff"]
+    assert "IDLE" in reported["powerOn"]
+    assert "RUNNING" in reported["brakeRelease"]
+    assert reported["quit"] is True

@@ -115,22 +115,24 @@ def test_arv_tool_reads_names_and_features_and_writes_some(peer: GigEPeer) -> No
     for name in ("DeviceVendorName", "ExposureTime", "TriggerSoftware", "FocusStepper"):
         assert f"'{name}'" in listed
     names = ("DeviceVendorName", "DeviceModelName", "DeviceSerialNumber", "DeviceVersion")
-    told = said(TOOL, "-a", peer.address, "control", *names, "ExposureTime=2500", "ExposureTime")
-    assert "DeviceVendorName = CalibrationCell" in told
-    assert "DeviceModelName = SimulatedCamera" in told
-    assert "DeviceSerialNumber = SIM-0001" in told
-    assert "ExposureTime = 2500" in told
+    reported = said(
+        TOOL, "-a", peer.address, "control", *names, "ExposureTime=2500", "ExposureTime"
+    )
+    assert "DeviceVendorName = CalibrationCell" in reported
+    assert "DeviceModelName = SimulatedCamera" in reported
+    assert "DeviceSerialNumber = SIM-0001" in reported
+    assert "ExposureTime = 2500" in reported
     assert peer.registers.get("ExposureTime") == 2500.0
 
 
 @pytest.mark.parametrize("trigger", [(), ("-o", "5")], ids=["free running", "triggered"])
 def test_arv_camera_test_streams_without_a_loss(peer: GigEPeer, trigger: tuple[str, ...]) -> None:
-    told = said(CLIENT, "-n", peer.address, "--duration=3", "-e", "5000", "-g", "3", *trigger)
-    assert "vendor name            = CalibrationCell" in told
-    counts = {name: int(count) for name, count in re.findall(r"(n_\w+) += (\d+)", told)}
+    reported = said(CLIENT, "-n", peer.address, "--duration=3", "-e", "5000", "-g", "3", *trigger)
+    assert "vendor name            = CalibrationCell" in reported
+    counts = {name: int(count) for name, count in re.findall(r"(n_\w+) += (\d+)", reported)}
     assert counts["n_completed_buffers"] >= 5
     for bad in ("n_failures", "n_missing_frames", "n_size_mismatch_errors", "n_error_packets"):
-        assert counts[bad] == 0, told
+        assert counts[bad] == 0, reported
 
 
 # ---- what Aravis 0.8.26 does that one would not guess -----------------------------------------

@@ -55,8 +55,8 @@ def read_file(path: Path) -> list[Series]:
         check_text(text, path)
         return _finite(_read_text(path, text))
     except (ValueError, ArithmeticError, RecursionError) as fault:
-        told = str(fault)[:200] or type(fault).__name__
-        raise InputError(f"{path}: cannot be read as poses: {told}") from None
+        reported = str(fault)[:200] or type(fault).__name__
+        raise InputError(f"{path}: cannot be read as poses: {reported}") from None
 
 
 def _finite(found: list[Series]) -> list[Series]:

@@ -79,10 +79,10 @@ def _mapping(
         for half in halves:
             rest.pop(half, None)
     for inner, item in rest.items():
-        told = _last_number(inner)
+        reported = _last_number(inner)
         at = f"{key}.{inner}".strip(".")
-        own = inner if told is not None else name
-        yield from _found_in(path, item, at, number if told is None else told, own, time_s)
+        own = inner if reported is not None else name
+        yield from _found_in(path, item, at, number if reported is None else reported, own, time_s)
 
 
 def _last_number(name: str) -> int | None:

@@ -89,9 +89,9 @@ def _summary(rows: Sequence[Row]) -> Mapping[str, Any]:
 
 def _solutions(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """By solution: every quantity's errors, and all together in sigmas."""
-    told = [estimate for row in rows for estimate in row["estimates"]]
+    reported = [estimate for row in rows for estimate in row["estimates"]]
     found = []
-    for name, own in grouped(told, "of"):
+    for name, own in grouped(reported, "of"):
         z = [e["z"] for e in own if e["z"] is not None]
         found.append(
             {

@@ -21,7 +21,7 @@ from cell.storage.files.study_file import Study
 from cell.verbs.simulate import with_truth
 from cell.verbs.study.estimates import COLUMN_OF, of_effect
 from cell.verbs.study.kinds.kind import Kind, Row, Task, grouped
-from cell.verbs.study.rates import rate, told
+from cell.verbs.study.rates import as_percent, rate
 from cell.verbs.study.trial import drawn, run_trial, truth_of
 
 NONE = "no effect"
@@ -160,7 +160,10 @@ def _tables(summary: Mapping[str, Any]) -> Sequence[Table]:
     for cell in summary["effects"]:
         plain = cell["effect"] == NONE
         instead = ", ".join(f"{name} ({count})" for name, count in cell["taken_for"].items())
-        rates = [told(cell["detected"]), *("-" if plain else told(cell[n]) for n in _RATES[1:])]
+        rates = [
+            as_percent(cell["detected"]),
+            *("-" if plain else as_percent(cell[n]) for n in _RATES[1:]),
+        ]
         table.add_row(cell["effect"], "-" if plain else f"{cell['size']:g}", *rates, instead)
     return [table]
 

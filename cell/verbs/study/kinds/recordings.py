@@ -123,14 +123,14 @@ def _diagnosed(recording: Recording) -> Row:
 
 
 def _summary(rows: Sequence[Row]) -> Mapping[str, Any]:
-    told = [
+    reported = [
         {name: value for name, value in row.items() if name not in ("document", "worker", "key")}
         for row in rows
     ]
     verdicts = {
         verdict: len(own) for verdict, own in grouped(rows, "verdict") if verdict is not None
     }
-    return {"recordings": told, "verdicts": verdicts}
+    return {"recordings": reported, "verdicts": verdicts}
 
 
 def _tables(summary: Mapping[str, Any]) -> Sequence[Table]:

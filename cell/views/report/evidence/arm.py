@@ -55,7 +55,7 @@ def error_against_approach(data: ReportData, effect: Mapping[str, Any]) -> Figur
     came = np.sign(views.joints_rad - views.approach_joints_rad)
     if shifts is None or not np.isfinite(came).any():
         return None
-    joint = (named_joint(effect) or 1 + _most_telling(came, shifts[0])) - 1
+    joint = (named_joint(effect) or 1 + _most_informative(came, shifts[0])) - 1
     names = (WITHOUT, WITH)
     shown = [(n, s) for n, s in zip(names, shifts, strict=True) if s is not None]
     figure, axes = panels(9.2, 2.8, columns=len(shown), sharey=True)
@@ -72,7 +72,7 @@ def error_against_approach(data: ReportData, effect: Mapping[str, Any]) -> Figur
     return figure
 
 
-def _most_telling(came: FloatArray, shift: FloatArray) -> int:
+def _most_informative(came: FloatArray, shift: FloatArray) -> int:
     """The joint whose direction of arrival splits the errors most."""
     split = [_distance(shift[side > 0], shift[side < 0]) for side in came.T]
     return int(np.argmax(split))

@@ -129,8 +129,8 @@ def _unexplained(diagnosis: Mapping[str, Any]) -> str:
     every = diagnosis.get("unexplained_all") or []
     if not every:
         return ""
-    told = "".join(_without_a_name(left) for left in every)
-    return f"<h3>What nobody can name</h3>{told}"
+    reported = "".join(_without_a_name(left) for left in every)
+    return f"<h3>What nobody can name</h3>{reported}"
 
 
 _LOOK_AT = {

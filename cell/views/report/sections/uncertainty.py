@@ -20,7 +20,7 @@ def uncertainty(data: ReportData) -> str:
     return html.section(
         "uncertainty",
         "Uncertainty of the camera, and what the views cannot tell apart",
-        _told(calibration.get("uncertainty")),
+        _uncertainty_map(calibration.get("uncertainty")),
         _not_separable(calibration),
         cross_validation(calibration),
     )
@@ -62,15 +62,17 @@ _NUMBERS = {
 
 def in_words(names: Sequence[str]) -> list[str]:
     """The numbers of a calibration as a reader knows them."""
-    told = []
+    reported = []
     for name in names:
         frame, _, axis = name.partition(".")
         what = f"turn about {axis[1:]}" if axis.startswith("r") else f"place along {axis}"
-        told.append(_FRAMES[frame].format(what) if frame in _FRAMES else _NUMBERS.get(name, name))
-    return told
+        reported.append(
+            _FRAMES[frame].format(what) if frame in _FRAMES else _NUMBERS.get(name, name)
+        )
+    return reported
 
 
-def _told(found: Mapping[str, Any] | None) -> str:
+def _uncertainty_map(found: Mapping[str, Any] | None) -> str:
     if not found:
         return html.missing("The camera's uncertainty is not known: no joint fit with the robot.")
     head = ("distance", "pixels: mean, worst (px)", "across (mm)", "along the axis (mm)",

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.calibration.roughly_known import Doubt
+from calib.calibration.roughly_known import GuessSigma
 
 _BOUND_SIGMA = 2.0
 """A bound that somebody tells is taken for two sigmas along each axis."""
 
 
 @dataclass(frozen=True)
-class LayoutDoubt:
+class LayoutUncertainty:
     """Bounds of what `layout` says.
 
     Attributes
@@ -35,9 +35,9 @@ class LayoutDoubt:
     reach_m: float = 0.15
 
     @property
-    def doubt(self) -> Doubt:
+    def prior_sigma(self) -> GuessSigma:
         """As the one-sigma widths of a prior."""
-        return Doubt(
+        return GuessSigma(
             self.mount_m / _BOUND_SIGMA,
             self.mount_rad / _BOUND_SIGMA,
             self.alpha_share / _BOUND_SIGMA,

@@ -55,12 +55,12 @@ def _fitted(twin: JointFit, index: int) -> _Fitted:
     return _Fitted(present, covariance)
 
 
-def told_law(
+def found_law(
     twin: JointFit, index: int, holdout_gain_px: float, rivals: tuple[str, ...]
 ) -> FoundLaw:
     """What is known of the law that is effect `index` of the twin."""
     if is_arm_field(twin.model.effects[index]):
-        return _told_field(twin.model.effects[index], holdout_gain_px)
+        return _found_field(twin.model.effects[index], holdout_gain_px)
     fitted = _fitted(twin, index)
     law = law_of(fitted.present)
     swings = law.form.key == "periodic"
@@ -74,7 +74,7 @@ def told_law(
     )
 
 
-def _told_field(present: Present, holdout_gain_px: float) -> FoundLaw:
+def _found_field(present: Present, holdout_gain_px: float) -> FoundLaw:
     given, (size_m, size_rad) = present.as_mapping(), rms(present)
     along = str(present.effect.law).partition("/")[2]
     return FoundLaw(
@@ -95,14 +95,14 @@ def _told_field(present: Present, holdout_gain_px: float) -> FoundLaw:
 def _as_they_are(law: Law, fitted: _Fitted) -> dict[str, Value]:
     amounts = [p.name for p in fitted.present.effect.parameters if p.role == "amount"]
     numbers = [n.name for n in law.form.numbers if n.name != "from_end"]
-    told = {name: fitted.plain(name) for name in (*amounts, *numbers)}
+    reported = {name: fitted.plain(name) for name in (*amounts, *numbers)}
     unit = law.covariates[0].unit
-    return {k: Value(v.value, v.sigma, unit) if k in numbers else v for k, v in told.items()}
+    return {k: Value(v.value, v.sigma, unit) if k in numbers else v for k, v in reported.items()}
 
 
 def _swinging(law: Law, fitted: _Fitted) -> dict[str, Value]:
     """Amplitude and phase of each component, and how often it swings."""
-    told: dict[str, Value] = {}
+    reported: dict[str, Value] = {}
     for k in law.components:
         component, unit, _ = law.site.components[k]
         names = (f"sin_{component}", f"cos_{component}")
@@ -110,17 +110,17 @@ def _swinging(law: Law, fitted: _Fitted) -> dict[str, Value]:
         size = float(np.hypot(sine, cosine))
         along = np.array([sine, cosine]) / max(size, 1e-300)
         across = np.array([-cosine, sine]) / max(size, 1e-300) ** 2
-        told[f"amplitude_{component}"] = Value(size, fitted.sigma_along(names, along), unit)
+        reported[f"amplitude_{component}"] = Value(size, fitted.sigma_along(names, along), unit)
         phase = float(np.arctan2(cosine, sine))
-        told[f"phase_rad_{component}"] = Value(phase, fitted.sigma_along(names, across), "rad")
+        reported[f"phase_rad_{component}"] = Value(phase, fitted.sigma_along(names, across), "rad")
     cycles = fitted.plain("cycles")
     if law.covariates[0].cyclic:
-        told["cycles_per_turn"] = Value(cycles.value, cycles.sigma, "1")
+        reported["cycles_per_turn"] = Value(cycles.value, cycles.sigma, "1")
     else:
         period = 2.0 * np.pi / cycles.value
         unit = law.covariates[0].unit
-        told["period"] = Value(period, period * cycles.sigma / cycles.value, unit)
-    return told
+        reported["period"] = Value(period, period * cycles.sigma / cycles.value, unit)
+    return reported
 
 
 def _equation(law: Law, values: Mapping[str, float]) -> str:
