@@ -63,6 +63,10 @@ def _flange(amount: FloatArray, state: ChainState) -> None:
     state.base_from_flange = state.base_from_flange @ rigid.from_vector(amount)
 
 
+def _base(amount: FloatArray, state: ChainState) -> None:
+    state.base_from_flange = rigid.from_vector(amount) @ state.base_from_flange
+
+
 def _mounted(amount: FloatArray, state: ChainState) -> None:
     state.flange_from_mounted = state.flange_from_mounted @ rigid.from_vector(amount)
 
@@ -91,6 +95,7 @@ _RIGID = tuple(
 SITES: tuple[Site, ...] = (
     *(_joint(k) for k in range(6)),
     Site("flange_pose", "arm", "mount", _RIGID, _flange),
+    Site("base_pose", "arm", "mount", _RIGID, _base),
     Site("mounted_pose", "mount", "mount", _RIGID, _mounted),
     Site("fixed_pose", "board", "board", _RIGID, _fixed),
     Site("focal_length", "lens", "lens", (("relative", "1", 1e-3),), _focal),

@@ -22,7 +22,7 @@ from calib.discovery.diagnosis import (
 )
 from calib.discovery.history import with_history
 from calib.discovery.laws.arm_field import is_arm_field, made_anew
-from calib.discovery.laws.contest import law_leads
+from calib.discovery.laws.contest import begin_with_law, law_leads
 from calib.discovery.laws.found_law import found_law
 from calib.discovery.locate import Cell, locate
 from calib.discovery.log_consistency.branches import choose_branches, with_branches
@@ -110,20 +110,33 @@ def _searched(search: Search, before: JointFit) -> ResidualStructure:
     return find_residual_structure(again, (scatter.cell,))
 
 
+_FAR_BEHIND = 60.0
+"""A search begun with a law is given up where it is behind by this much: what is left after it, and
+a field that makes names needless, gained less."""
+
+
 def _or_laws_first(structure: ResidualStructure, before: JointFit) -> ResidualStructure:
-    """The same search begun with a law where one beats every single name in the plain cell.
+    """The same search begun with a law, where that says the same with fewer names, or says more.
 
     What no name fits may be soaked up by two or three, none of which a law could replace alone.
     """
     search = structure.search
-    if not search.steps:
-        return structure
+    names = len(_names(search))
     again = Search(before, search.fitter, search.branch_price)
-    if not law_leads(again):
+    if names == 0 or (names == 1 and not law_leads(again)):
         return structure
-    other = find_residual_structure(again)
-    better = again.best.criterion < search.best.criterion - UNDECIDED
+    begun = begin_with_law(again)
+    if begun is None or again.best.criterion > search.best.criterion + _FAR_BEHIND:
+        return structure
+    other = find_residual_structure(again, begun=(begun,))
+    shorter = len(other.search.best.fit.model.effects) < len(search.best.fit.model.effects)
+    fewer = shorter and len(_names(other.search)) < names
+    better = other.search.like_for_like() < search.like_for_like() - (0.0 if fewer else UNDECIDED)
     return other if better else structure
+
+
+def _names(search: Search) -> list[str]:
+    return [p.effect.name for p in search.best.fit.model.effects if p.effect.name != UNNAMED]
 
 
 def _with_branches(repaired: LogRepair) -> tuple[LogRepair, float]:

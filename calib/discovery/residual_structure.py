@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from calib.chain.empirical import present_curve
@@ -52,12 +53,14 @@ def is_shape_of_law(cell: Cell, search: Search) -> bool:
     )
 
 
-def find_residual_structure(search: Search, known: tuple[Cell, ...] = ()) -> ResidualStructure:
+def find_residual_structure(
+    search: Search, known: tuple[Cell, ...] = (), begun: Sequence[Cell] = ()
+) -> ResidualStructure:
     """Test what is left; carry it by unnamed curves and see which names are still needed then.
 
-    `known` is what is known to be left already.
+    `known` is what is known to be left already, `begun` what is carried already.
     """
-    found = _carried(search)
+    found = [*begun, *_carried(search)]
     replacing = replaced_by_laws(search)
     if replacing:
         found += replacing + _carried(search)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.chain.effect import Present
+from calib.chain.empirical import UNNAMED
 from calib.discovery.candidates import Candidate, candidates, finer, joined
 from calib.discovery.fields import picture_score
 from calib.discovery.score import Score, bic, score_effects
@@ -314,6 +315,17 @@ class Search:
         self._settle(tried)
         return True
 
+    def like_for_like(self) -> float:
+        """The criterion with every effect at the same price, be it a name or a law.
+
+        A law that was demanded at the price of all laws is beyond chance: beside a name it pays
+        as that does, for the few that resemble it.
+        """
+        effects = self.best.fit.model.effects
+        laws = [p.effect.label for p in effects if p.effect.name == UNNAMED]
+        own = sum(2.0 * float(np.log(self.choices.get(label, 1.0))) for label in laws)
+        return self.best.criterion - own + DEMAND * len(effects)
+
     def leave_out(self, present: Present) -> None:
         """Go on without an effect, whatever that costs."""
         _, without = self.missed(present)
@@ -368,21 +380,25 @@ class Search:
         A curve leaves something of what it carries: no name rests on that. What the pictures show
         by themselves is held against curves in its own link only.
         """
-        effects = self.best.fit.model.effects
-        curves = [p for p in effects if p.effect.name == "empirical"]
-        worth = {curve.effect.label: self.missed(curve)[0] for curve in curves}
-        for present in effects:
-            in_link = (c for c in curves if c.effect.link == present.effect.link)
+        for present in self.best.fit.model.effects:
+            curves = [p for p in self.best.fit.model.effects if p.effect.name == UNNAMED]
+            share = _POSE_SHARE
             if present.effect.seen_without_robot:
-                least = _BESIDE_SHARE * sum(worth[c.effect.label] for c in in_link)
-            else:
-                least = _POSE_SHARE * sum(worth.values())
-            if present.effect.name == "empirical" or least == 0.0:
+                share = _BESIDE_SHARE
+                curves = [c for c in curves if c.effect.link == present.effect.link]
+            if present.effect.name == UNNAMED or not curves:
                 continue
             missed, without = self.missed(present)
-            if missed < least:
+            if missed < share * self._worth_without(without, curves):
                 self._settle(without)
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
+
+    def _worth_without(self, fit: JointFit, curves: Sequence[Present]) -> float:
+        """What curves gain in a fit without the name beside them, which may share their work."""
+        labels = {curve.effect.label for curve in curves}
+        rest = [p for p in fit.model.effects if p.effect.label not in labels]
+        bare = self.fitter.with_effects(fit, rest)
+        return self._trial(bare).criterion - self._trial(fit).criterion
 
     def missed(self, present: Present) -> tuple[float, JointFit]:
         """By how much the criterion rises without an effect, and the fit without it."""

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.discovery.recordings import conceal
+from benchmarks.discovery.run import views_of
 from calib.chain.effects import make_effect
 from calib.chain.laws.arm_field import coordinates, present_field
 from calib.chain.model import predict
@@ -13,8 +15,9 @@ from calib.discovery.laws.arm_field import find_arm_field
 from calib.discovery.laws.cross_validation import CrossValidation
 from calib.discovery.laws.frames import frame_blocks
 from calib.discovery.laws.review import drop_unsupported, replaced_by_laws
+from calib.discovery.log_repair import repair_log
 from calib.discovery.search import Search, within_bounds
-from calib.discovery.start import Fitter
+from calib.discovery.start import Fitter, fit_start
 from calib.views import Views
 from tests.discovery.simulated_runs import NOISE, log, plain_cell, record
 
@@ -111,3 +114,17 @@ def test_a_field_comes_back_from_its_file_and_is_nothing_far_from_its_nodes():
     away = np.linalg.norm(coordinates(LOG, "joints")[:, None] - nodes, axis=2).min(axis=1)
     assert near[:4].min() > 0.5
     assert near[away > 2.5].max(initial=0.0) < 0.05
+
+
+def test_corners_that_err_alike_in_a_picture_make_no_name():
+    """Their likelihood counts every corner; the frames left out do not all gain by the name."""
+    case = conceal("clean 7")
+    views = views_of(case, np.flatnonzero(~case.ahead))
+    repaired = repair_log(views, views)
+    every = np.ones(len(views), dtype=bool)
+    fitter = Fitter(repaired.views)
+    start = fit_start(fitter, repaired.free, every)
+    search = Search(start, fitter)
+    search.force([make_effect("joint_zero_offset", {}), make_effect("board_shear", {})])
+    drop_unsupported(search)
+    assert names(search) == ["joint_zero_offset"]

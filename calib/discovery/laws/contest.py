@@ -77,9 +77,21 @@ def law_leads(search: Search) -> bool:
     """Whether in the cell as it is a law promises more than any name does."""
     fit = search.best.fit
     laws = promising(fit, search, 1)
-    if not laws or any(along_its_own(effect, laws[0].law) for effect in catalogue()):
-        return False
-    return laws[0].worth > search.promised(fit)
+    return bool(laws) and laws[0].worth > search.promised(fit)
+
+
+def begin_with_law(search: Search) -> Cell | None:
+    """Take in the law that the plain cell demands, and names beside it; its cell.
+
+    None where there is none, or where it is a name's own physics.
+    """
+    before = search.best
+    told = demanded(search)
+    if not told or any(along_its_own(effect, told[0].found.law) for effect in catalogue()):
+        return None
+    search.take_in(told[0].candidate, told[0].trial.fit)
+    search.run()
+    return as_cell(told, before)
 
 
 def along_its_own(effect: Effect, law: Law) -> bool:

@@ -19,6 +19,10 @@ _FOLDS = 8
 _BLOCK_FRAMES = 2
 
 
+_BEYOND_CHANCE = 1.64
+"""One-sided 5 %: so many standard errors above zero is a gain in frames that had no say."""
+
+
 @dataclass(frozen=True)
 class Worth:
     """What the left-out frames lose without an effect.
@@ -27,17 +31,21 @@ class Worth:
     ----------
     minus_two_log:
         Rise of -2 log likelihood over all frames, each left out once.
+    sigma:
+        Its standard error, from how differently the frames gain: corners of one picture may err
+        alike, which the likelihood of each does not know.
     gain_px:
         Rise of the RMS distance of the corners from where they are predicted by the log alone.
     """
 
     minus_two_log: float
+    sigma: float
     gain_px: float
 
     @property
     def supported(self) -> bool:
-        """Whether the left-out frames want the effect at all."""
-        return self.minus_two_log > 0.0
+        """Whether the left-out frames want the effect, beyond chance."""
+        return self.minus_two_log > _BEYOND_CHANCE * self.sigma
 
 
 def folds(frames: int) -> NDArray[np.int64]:
@@ -71,20 +79,24 @@ class CrossValidation:
                 mine.append(k)
                 zero.append(-present.values[place] if amount else 0.0)
         lost = self._lost(np.array(mine, dtype=np.int64), np.array(zero))
-        return Worth(lost[0] - self.whole[0], lost[1] - self.whole[1])
+        more = lost[0] - self.whole[0]
+        sigma = float(np.sqrt(len(more)) * more.std())
+        return Worth(float(more.sum()), sigma, lost[1] - self.whole[1])
 
-    def _lost(self, held: NDArray[np.int64], at: FloatArray) -> tuple[float, float]:
-        """(-2 log likelihood but for a constant, RMS px) with some numbers held at a step."""
+    def _lost(self, held: NDArray[np.int64], at: FloatArray) -> tuple[FloatArray, float]:
+        """(N,) -2 log likelihood but for a constant, and RMS px, some numbers held at a step."""
         free = np.setdiff1d(np.arange(self.blocks.shared), held)
-        quadratic, square_px, weight = 0.0, 0.0, 0.0
+        quadratic = np.zeros(len(self.blocks.gradient))
+        square_px, weight = 0.0, 0.0
         for out, (information, gradient) in zip(self.left_out, self.train, strict=True):
             step = np.zeros(self.blocks.shared)
             step[held] = at
             right = gradient[free] - information[np.ix_(free, held)] @ at
             root = inverse_root(information[np.ix_(free, free)])
             step[free] = root @ (root.T @ right)
-            quadratic += _form(self.blocks.information, self.blocks.gradient, out, step)
-            square_px += _form(self.blocks.pixel_information, self.blocks.pixel_gradient, out, step)
+            quadratic[out] = _form(self.blocks.information, self.blocks.gradient, out, step)
+            moved_px = _form(self.blocks.pixel_information, self.blocks.pixel_gradient, out, step)
+            square_px += float(moved_px.sum())
             square_px += float(self.blocks.pixel_square[out].sum())
             weight += float(self.blocks.corners[out].sum())
         return quadratic, float(np.sqrt(max(square_px, 0.0) / max(weight, 1.0)))
@@ -92,7 +104,8 @@ class CrossValidation:
 
 def _form(
     information: FloatArray, gradient: FloatArray, frames: BoolArray, step: FloatArray
-) -> float:
+) -> FloatArray:
+    """(n,) of the chosen frames."""
     t = len(step)
-    h, g = information[frames, :t, :t].sum(axis=0), gradient[frames, :t].sum(axis=0)
-    return float(step @ h @ step - 2.0 * step @ g)
+    h, g = information[frames, :t, :t], gradient[frames, :t]
+    return np.asarray((h @ step) @ step - 2.0 * g @ step)

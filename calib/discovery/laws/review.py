@@ -32,24 +32,39 @@ _FITTED = 2
 
 
 def replaced_by_laws(search: Search) -> list[Cell]:
-    """Put a law in the place of every name that it beats, price and all; the laws' cells."""
+    """Put a law in the place of every name that it beats; the laws' cells."""
     cells = []
     for label in [p.effect.label for p in search.best.fit.model.effects]:
         present = next((p for p in search.best.fit.model.effects if p.effect.label == label), None)
         if present is None or present.effect.name == UNNAMED:
             continue
-        _, without = search.missed(present)
+        missed, without = search.missed(present)
         (score,) = score_effects(without, search.views, [blank(present)])
         laws = [
             law
             for law in promising(without, search, _FITTED)
             if law.gain > _AS_GOOD * score.gain and not along_its_own(present.effect, law.law)
         ]
-        tried = fitted(without, search, laws)
-        if not tried or tried[0].trial.criterion > search.best.criterion:
-            continue
-        cells.append(_put_in(search, shortest_first(tried), label))
+        base = search.best.criterion + missed
+        better = [
+            one for one in fitted(without, search, laws) if _beats(one, base, search.best.criterion)
+        ]
+        if better:
+            cells.append(_put_in(search, shortest_first(better), label))
     return cells
+
+
+def _beats(law: Tried, without: float, with_name: float) -> bool:
+    """Whether a law is better than a name, both against the criterion without either.
+
+    A law that is beyond chance by itself, at the price of all among which it was picked, is no fit
+    to noise: against the name it pays for the fifty or so (`DEMAND` is twice the logarithm of
+    that) that do about the same as the name does.
+    """
+    reached = law.trial.criterion
+    if without - reached >= DEMAND:
+        reached += min(0.0, DEMAND - 2.0 * law.found.choices)
+    return reached < with_name
 
 
 def _put_in(search: Search, tried: list[Tried], label: str) -> Cell:
@@ -127,13 +142,16 @@ def drop_unsupported(search: Search, *, beside_field: bool = False) -> None:
         fit = search.best.fit
         checked = CrossValidation(fit, frame_blocks(fit, search.views))
         worth = [checked.without(k) for k in range(len(fit.model.effects))]
-        lowest = [
-            min(w.minus_two_log, w.gain_px) if beside_field and _in_camera(p) else w.minus_two_log
+        wanted = [
+            w.supported and not (beside_field and _in_camera(p) and w.gain_px <= 0.0)
             for w, p in zip(worth, fit.model.effects, strict=True)
         ]
-        least = lowest.index(min(lowest))
-        if lowest[least] > 0.0:
+        if all(wanted):
             return
+        least = min(
+            (k for k, is_wanted in enumerate(wanted) if not is_wanted),
+            key=lambda k: worth[k].minus_two_log,
+        )
         search.leave_out(fit.model.effects[least])
 
 

@@ -25,6 +25,10 @@ def _flange(amount: Array, scene: Scene) -> None:
     scene.flange = anp.dot(scene.flange, formulas.rigid(amount))
 
 
+def _base(amount: Array, scene: Scene) -> None:
+    scene.flange = anp.dot(formulas.rigid(amount), scene.flange)
+
+
 def _mounted(amount: Array, scene: Scene) -> None:
     scene.mounted = anp.dot(scene.mounted, formulas.rigid(amount))
 
@@ -50,6 +54,7 @@ def _radial(amount: Array, scene: Scene) -> None:
 SITES: dict[str, Callable[[Array, Scene], None]] = {
     **{f"joint_{k + 1}": _joint(k) for k in AXES},
     "flange_pose": _flange,
+    "base_pose": _base,
     "mounted_pose": _mounted,
     "fixed_pose": _fixed,
     "focal_length": _focal,
