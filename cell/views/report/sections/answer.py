@@ -46,9 +46,20 @@ def answer(data: ReportData) -> str:
         f"{_warnings(data)}"
         f'<div class="cards">{_cards(data)}</div>'
         f"{take_away(data)}"
-        f'<div class="pair"><div>{picture}</div><div>{_by_distance(data, best)}'
-        f"<h3>What can be trusted</h3>{html.bullets(sentences(data))}</div></div></section>"
+        f'<div class="{_columns(picture)}"><div>{picture}</div><div>{_by_distance(data, best)}'
+        f"<h3>What can be trusted</h3>{_first_few(sentences(data))}</div></div></section>"
     )
+
+
+def _columns(picture: str) -> str:
+    """Side by side only where there is something to stand beside: no half page stays empty."""
+    return "pair" if "<svg" in picture else ""
+
+
+def _first_few(items: Sequence[str]) -> str:
+    """The sentences that matter for the decision; the others one step away."""
+    more = html.fold(f"{len(items) - _FIRST} more", html.bullets(items[_FIRST:]))
+    return html.bullets(items[:_FIRST]) + (more if len(items) > _FIRST else "")
 
 
 def verdict_words(data: ReportData) -> tuple[str, str, str]:
@@ -91,10 +102,9 @@ def _warnings(data: ReportData) -> str:
     ]
     if not items:
         return ""
-    more = html.fold(f"{len(items) - _FIRST} more", html.bullets(items[_FIRST:]))
     return (
         f'<div class="warnings" role="alert"><h3>Known to be wrong or not determined</h3>'
-        f"{html.bullets(items[:_FIRST])}{more if len(items) > _FIRST else ''}</div>"
+        f"{_first_few(items)}</div>"
     )
 
 

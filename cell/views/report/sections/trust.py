@@ -17,16 +17,20 @@ _MANY_TIMES = 3.0
 
 
 def sentences(data: ReportData) -> list[str]:
-    """Sentences a technician can act on; what was not logged is among them."""
+    """Sentences a technician can act on, those first that decide whether the camera is used.
+
+    What was not logged is among them; the numbers, which the tables have as well, stand last.
+    """
     return [
-        *_scale(data),
-        *uncertainty_sentences(data),
+        *_outliers(data),
         *cross_validation_sentences(data),
         *_corrected(data),
-        *_zhang(data),
-        *_truth(data),
+        *uncertainty_sentences(data),
         *_independence(data),
+        *_truth(data),
+        *_zhang(data),
         *not_logged(data),
+        *_scale(data),
     ]
 
 
@@ -107,5 +111,8 @@ def _independence(data: ReportData) -> Iterator[str]:
             "Camera and robot were matched on these same frames: an error common to all of them, "
             "such as a wrong scale of robot or board, would not show. Check with a known length."
         )
+
+
+def _outliers(data: ReportData) -> Iterator[str]:
     for frame in ((data.calibration or {}).get("robot") or {}).get("outliers") or []:
         yield f"Frame {frame}: the logged pose disagrees with the picture; look at that frame."
