@@ -20,8 +20,6 @@ return [...document.querySelectorAll('table, svg, pre, nav, .card, .scroll')]
 SENTENCES = (
     "return [...document.querySelectorAll('#answer > .pair li, #answer > div:last-child li')]"
 )
-    "return [...document.querySelectorAll('#answer > .pair li, #answer > div:last-child li')]"
-)
 
 
 @pytest.fixture(scope="module")
