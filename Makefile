@@ -28,7 +28,7 @@ run: $(STAMP)  ## the paper's larger cell, simulated, with its report
 test: $(STAMP) lint types layers docs  ## lint, types, layers, docs and every test
 	tools/install-debian-packages test
 	tools/install-mrcal
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 3 --dist loadgroup
 
 test-fast: $(STAMP) lint types layers  ## lint, types, layers, and the tests that take a moment
 	$(BIN)/python -m pytest -n 2 $(FAST)

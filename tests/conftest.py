@@ -25,6 +25,11 @@ MAY_SKIP = (
 """How the reasons of those tests begin that may be skipped even so."""
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long tests and those that stay together come first: at the end no process waits for them."""
+    items.sort(key=lambda item: not {"xdist_group", "slow"} & {m.name for m in item.iter_markers()})
+
+
 def _refuse(report: pytest.TestReport | pytest.CollectReport) -> None:
     if os.environ.get("CELL_NO_SKIP") != "1" or not report.skipped or hasattr(report, "wasxfail"):
         return

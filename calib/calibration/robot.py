@@ -174,9 +174,8 @@ def _best_lens(plain: CellModel, views: Views, noise: Noise) -> tuple[str | None
 
 def _borne_out(still: JointFit, moving: JointFit, views: Views) -> bool:
     pictures = picture_evidence(still, moving, views)
-    if _arm_is_true(moving):
-        return pictures.deviation < THREE_SIGMAS
-    return pictures.gain > THREE_SIGMAS
+    by_themselves = pictures.gain > THREE_SIGMAS
+    return by_themselves or (_arm_is_true(moving) and pictures.deviation < THREE_SIGMAS)
 
 
 def _fit(model: CellModel, views: Views, noise: Noise) -> JointFit:
