@@ -19,7 +19,7 @@ $(STAMP): pyproject.toml tools/install-debian-packages
 	tools/install-debian-packages
 	$(PYTHON) -m venv --system-site-packages $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet -e '.[dev,ur,abb,genicam,study]'
+	$(BIN)/python -m pip install --quiet -e '.[dev,ur,abb,genicam,ros,study]'
 	touch $@
 
 run: $(STAMP)  ## the paper's larger cell, simulated, with its report

@@ -11,12 +11,14 @@ from calib.mount import Mount
 from cell.cli.json_flag import JsonFlag
 from cell.errors import BadAnswer
 from cell.storage.files.results import new_folder
-from cell.verbs.importing import RotationName, Unit
+from cell.verbs.importing import RotationName, Take, Unit
 from cell.views.terminal.output import say, show
 
 
 def import_(
-    source: Annotated[Path, typer.Argument(help="A recording, or a folder of pictures.")],
+    source: Annotated[
+        Path, typer.Argument(help="A recording, a folder of pictures, or a ROS bag.")
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder of the new recording.")
     ] = None,
@@ -53,12 +55,36 @@ def import_(
         float | None,
         typer.Option(help="Seconds that a pose may be away from its picture (0.05 without)."),
     ] = None,
+    image_topic: Annotated[
+        str | None, typer.Option(help="ROS bag: topic of the pictures; the only one without.")
+    ] = None,
+    joint_topic: Annotated[
+        str | None, typer.Option(help="ROS bag: topic of the joints; /joint_states without.")
+    ] = None,
+    base: Annotated[
+        str | None,
+        typer.Option(help="ROS bag: frame of the robot's base; base, base_link without."),
+    ] = None,
+    flange: Annotated[
+        str | None, typer.Option(help="ROS bag: frame of the flange; tool0, flange without.")
+    ] = None,
+    take: Annotated[
+        Take | None,
+        typer.Option(
+            help="ROS bag: which pictures; one of each standstill if there are 8 or more."
+        ),
+    ] = None,
+    clock_offset: Annotated[
+        float | None,
+        typer.Option(help="ROS bag: seconds to add to the pictures' stamps; estimated without."),
+    ] = None,
     as_json: JsonFlag = False,
 ) -> None:
     """Turn images and poses of another tool's layout into a recording, corners found."""
     from cell.storage.files.board_words import parse_board
     from cell.verbs.importing.conventions import Said
-    from cell.verbs.importing.importer import Described, import_source
+    from cell.verbs.importing.described import Described, OfBag
+    from cell.verbs.importing.importer import import_source
     from cell.views.terminal.progress import counted_progress
 
     described = Described(
@@ -69,6 +95,7 @@ def import_(
         mount=mount,
         robot=robot,
         time_bound_s=time_bound,
+        bag=OfBag(image_topic, joint_topic, base, flange, take, clock_offset),
     )
     folder = output or new_folder(f"{source.resolve().name}-imported")
     with counted_progress("finding corners") as progress:

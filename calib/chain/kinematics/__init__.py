@@ -6,7 +6,7 @@ reads any other six-joint arm, `adopt` makes it known by its name.
 
 from calib.chain.kinematics.arm import ArmKinematics, OutOfReach
 from calib.chain.kinematics.models import MODELS, UnknownArm, adopt, arm
-from calib.chain.kinematics.urdf import UnusableUrdf, arm_from_urdf
+from calib.chain.kinematics.urdf import UnusableUrdf, arm_from_urdf, joint_names
 
 __all__ = [
     "MODELS",
@@ -17,4 +17,5 @@ __all__ = [
     "adopt",
     "arm",
     "arm_from_urdf",
+    "joint_names",
 ]

@@ -50,12 +50,7 @@ def arm_from_urdf(text: str, base: str, flange: str, name: str) -> ArmKinematics
     UnusableUrdf
         With what is wrong and where.
     """
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise UnusableUrdf("declares a document type; a URDF has none")
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as fault:
-        raise UnusableUrdf(f"is no XML: {fault}") from None
+    root = _root(text)
     start, path = _path(root, base, flange)
     turning = [joint for joint in path if joint.get("type") in _TURNING]
     if len(turning) != JOINTS:
@@ -80,6 +75,21 @@ def arm_from_urdf(text: str, base: str, flange: str, name: str) -> ArmKinematics
         masses=_masses(_inertials(root, path, poses), rows, ends),
         inverse_branches=GeneralInverse(rows, ends),
     )
+
+
+def joint_names(text: str, base: str, flange: str) -> tuple[str, ...]:
+    """Names of the turning joints from base to flange; raises `UnusableUrdf`."""
+    path = _path(_root(text), base, flange)[1]
+    return tuple(joint.get("name", "") for joint in path if joint.get("type") in _TURNING)
+
+
+def _root(text: str) -> ElementTree.Element:
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise UnusableUrdf("declares a document type; a URDF has none")
+    try:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError as fault:
+        raise UnusableUrdf(f"is no XML: {fault}") from None
 
 
 def _path(

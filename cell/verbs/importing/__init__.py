@@ -19,3 +19,5 @@ RotationName = Literal[
     "euler_zyz_deg",
 ]
 Unit = Literal["m", "mm", "cm", "in"]
+Take = Literal["still", "moving", "all"]
+"""Which pictures of a ROS bag."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from calib.detection.orientation import Closure, RoughPoses
 from calib.views import Board, FloatArray, Mount
-from cell.errors import BadAnswer, InputError
+from cell.errors import InputError
 from cell.storage.incoming import plain_file, read_picture
 from cell.storage.recording import (
     Corners,
@@ -27,81 +26,21 @@ from cell.storage.recording import (
     write_corners,
 )
 from cell.storage.recording.corners import FILE_NAME as DETECTIONS
-from cell.storage.recording.detect import Progress, detect_corners, detect_in_pictures
-from cell.verbs.importing.conventions import (
-    Candidate,
-    Convention,
-    PictureCheck,
-    Said,
-    conclude,
-)
+from cell.storage.recording.detect import Progress, detect_in_pictures
+from cell.verbs.importing.bags.bag import is_bag
+from cell.verbs.importing.bags.importer import import_bag
+from cell.verbs.importing.conventions import Candidate, Convention, conclude
+from cell.verbs.importing.described import Described
 from cell.verbs.importing.joints import as_poses, in_order, radians
+from cell.verbs.importing.outcome import Imported, checked, picture_check
 from cell.verbs.importing.pairing import apply, pairings
 from cell.verbs.importing.pose_files import flange_series, read_series
 from cell.verbs.importing.raw import Series
 from cell.verbs.importing.sources import common_size_px, pictures_in, pose_files_beside
 
-_ENOUGH_TO_ASK = 4
 _BOTH_MOUNTS = (
     "{one} OR {other} (say --mount): the pictures look the same either way and cannot tell"
 )
-
-
-@dataclass(frozen=True)
-class Described:
-    """What the user says of images and poses.
-
-    Attributes
-    ----------
-    board:
-        In the words of `recording.yaml`.
-    poses, joints:
-        File or folder of the poses, and of joint angles; None without.
-    rotation, unit, inverted:
-        How poses are written; `inverted`: they are flange_from_base. None where not said: then
-        the pictures are asked.
-    mount:
-        Where the camera sits; None where not said: on the flange, and said aloud.
-    robot, name:
-        For `recording.yaml`.
-    time_bound_s:
-        How far apart in time a picture and its pose may be.
-    """
-
-    board: dict[str, Any] | None = None
-    poses: Path | None = None
-    joints: Path | None = None
-    said: Said = field(default_factory=Said)
-    mount: Mount | None = None
-    robot: str | None = None
-    name: str | None = None
-    time_bound_s: float | None = None
-
-
-@dataclass(frozen=True)
-class Imported:
-    """What came of an import.
-
-    Attributes
-    ----------
-    folder, frames, with_corners, with_pose:
-        The recording, its frames, in how many of them the board was found, and how many have a
-        flange pose.
-    guessed:
-        What was concluded and not said.
-    rejected:
-        Frame number to the reason why it has no corners.
-    contradicted:
-        What was said and the pictures speak against.
-    """
-
-    folder: Path
-    frames: int
-    with_corners: int
-    with_pose: int
-    guessed: tuple[str, ...]
-    rejected: dict[int, str]
-    contradicted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -126,12 +65,14 @@ def import_source(
     BadAnswer
         The board was found in no picture.
     """
+    if is_bag(source):
+        return import_bag(source, folder, described, progress)
     if plain_file(source / "recording.yaml"):
         _copy_recording(read_recording(source), folder)
-        return _checked(read_recording(folder), None, (), (), progress)
+        return checked(read_recording(folder), None, (), (), progress)
     if source.is_dir():
         return _import_pictures(source, folder, described, progress)
-    raise InputError(f"{source}: is no folder of pictures and no recording")
+    raise InputError(f"{source}: is no folder of pictures, no recording and no ROS bag")
 
 
 def _copy_recording(recording: Recording, folder: Path) -> None:
@@ -178,7 +119,7 @@ def _import_pictures(
             writer.adopt(picture, name)
             writer.append(_frame(frame, name, picture, posed))
     against = () if posed is None else posed.convention.contradicted
-    return _checked(read_recording(folder), corners, notes, against, progress)
+    return checked(read_recording(folder), corners, notes, against, progress)
 
 
 def _series(described: Described) -> list[Series]:
@@ -236,7 +177,7 @@ def _posed(
         ways = pairings(names, each.poses, described.time_bound_s)
         candidates += [Candidate(each.poses, way, notes) for way in ways]
     mount: Mount = described.mount or "eye_in_hand"
-    check = _check(len(pictures), corners, board, mount)
+    check = picture_check(len(pictures), corners, board, mount)
     chosen, convention = conclude(candidates, described.said, check, board.square_m)
     matrices = np.array([convention.transform(pose).as_matrix() for pose in chosen.poses])
     guessed = convention.guessed
@@ -283,21 +224,6 @@ def _corners_of(
     return detect_in_pictures(loads, board, size_px, progress)
 
 
-def _check(pictures: int, corners: Corners, board: Board, mount: Mount) -> PictureCheck | None:
-    """What the whole boards among the pictures say of a reading of the poses."""
-    whole = [k for k in range(pictures) if k in corners.px and np.isfinite(corners.px[k]).all()]
-    if len(whole) < _ENOUGH_TO_ASK:
-        return None
-    rough = RoughPoses.of(np.array([corners.px[k] for k in whole]), board, mount)
-
-    def closure(by_picture: FloatArray) -> Closure | None:
-        read = by_picture[whole]
-        known = int(np.isfinite(read).all(axis=(1, 2)).sum())
-        return rough.closure(read) if known >= _ENOUGH_TO_ASK else None
-
-    return closure
-
-
 def _header(source: Path, size_px: tuple[int, int], described: Described) -> Header:
     width, height = size_px
     data: dict[str, Any] = {
@@ -336,36 +262,3 @@ def _frame(frame: int, name: str, picture: Path, posed: _Posed | None) -> FrameR
     if posed is not None and np.isfinite(posed.joints_rad[frame]).all():
         values["joints_rad"] = tuple(posed.joints_rad[frame].tolist())
     return FrameRecord.model_validate(values)
-
-
-def _checked(
-    recording: Recording,
-    corners: Corners | None,
-    guessed: tuple[str, ...],
-    contradicted: tuple[str, ...],
-    progress: Progress | None,
-) -> Imported:
-    """The recording's corners, found where they did not come with it, and what there is to say."""
-    if recording.has_detections:
-        corners = recording.detections()
-    else:
-        corners = detect_corners(recording, progress) if corners is None else corners
-        write_corners(recording.path / DETECTIONS, corners, recording.board)
-    if not corners.px:
-        reasons = "".join(
-            f"\n  frame {frame}: {why}" for frame, why in list(corners.rejected.items())[:3]
-        )
-        raise BadAnswer(
-            f"{recording.path}: the board was found in none of {len(recording.frames)} pictures."
-            f" Check rows, cols and type of the board.{reasons}"
-        )
-    posed = sum(frame.base_from_flange is not None for frame in recording.frames)
-    return Imported(
-        recording.path,
-        len(recording.frames),
-        len(corners.px),
-        posed,
-        guessed,
-        dict(corners.rejected),
-        contradicted,
-    )
