@@ -16,8 +16,7 @@ from calib.chain.empirical import UNNAMED
 from calib.chain.model import CellModel, predict
 from calib.discovery.laws.arm_field import is_arm_field, made_anew
 from calib.discovery.laws.cross_validation import folds
-from calib.discovery.locate import Cell, locate
-from calib.discovery.residual_structure import ResidualStructure, alarms, is_shape_of_law
+from calib.discovery.residual_structure import ResidualStructure, what_is_left
 from calib.discovery.search import Search
 from calib.discovery.start import Fitter
 from calib.solver.joint import JointFit
@@ -133,7 +132,7 @@ def drop_what_predicts_worse(
         worst = _worst(search, fit, held)
         dropped.append(Dropped(worst, now.rms_px, of_plain.rms_px))
         search.leave_out(worst)
-    return (_told_anew(structure), tuple(dropped)) if dropped else (structure, ())
+    return (_judged_anew(structure), tuple(dropped)) if dropped else (structure, ())
 
 
 def _worst(search: Search, fit: JointFit, held: Views) -> Present:
@@ -148,14 +147,10 @@ def _worst(search: Search, fit: JointFit, held: Views) -> Present:
     return fit.model.effects[int(np.argmin(rms_px))]
 
 
-def _told_anew(structure: ResidualStructure) -> ResidualStructure:
+def _judged_anew(structure: ResidualStructure) -> ResidualStructure:
     """What is unexplained once effects were dropped: the terms that stay, or what sounds now."""
     search = structure.search
     present = {p.effect.label for p in search.best.fit.model.effects}
     kept = [c for c in structure.cells if c.law is None or c.law.effect.label in present]
-    return ResidualStructure(search, tuple(kept or _what_is_left(search)))
-
-
-def _what_is_left(search: Search) -> list[Cell]:
-    reported = alarms(locate(search.best.fit, search.views))
-    return [cell for cell in reported if not is_shape_of_law(cell, search)][:1]
+    left = None if kept else what_is_left(search)
+    return ResidualStructure(search, tuple(kept) if left is None else (left,))

@@ -12,6 +12,7 @@ from calib.discovery.laws.contest import as_cell, demanded
 from calib.discovery.laws.review import drop_beside_kinematics, drop_unsupported, replaced_by_laws
 from calib.discovery.locate import Cell, locate
 from calib.discovery.search import Search
+from calib.discovery.spread import stands_out
 from calib.views import Views
 
 ALARM = 2e-3
@@ -53,6 +54,15 @@ def is_shape_of_law(cell: Cell, search: Search) -> bool:
     )
 
 
+def what_is_left(search: Search) -> Cell | None:
+    """The most significant cell that is more than chance and no named effect's shape, if any."""
+    fit, views = search.best.fit, search.views
+    reported = alarms(locate(fit, views, periods=False))
+    return next(
+        (c for c in reported if not is_shape_of_law(c, search) and stands_out(fit, views, c)), None
+    )
+
+
 def find_residual_structure(
     search: Search, known: tuple[Cell, ...] = (), begun: Sequence[Cell] = ()
 ) -> ResidualStructure:
@@ -84,8 +94,7 @@ def _carried(search: Search) -> list[Cell]:
         if law is not None:
             found.append(law)
             continue
-        reported = alarms(locate(search.best.fit, views, periods=False))
-        cell = next((c for c in reported if not is_shape_of_law(c, search)), None)
+        cell = what_is_left(search)
         if cell is None or cell.score.gain < _REMAINDER * known:
             break
         found.append(cell)
