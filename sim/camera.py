@@ -231,6 +231,7 @@ class SimCamera:
                 width_px=spec.width_px,
                 height_px=spec.height_px,
                 blur=Blur(spec.aperture_m, focus, spec.lens_sigma_px),
+                straightened=state.straightened if state.picture_fields else None,
             )
             self._rendered = shown, image
         return self._rendered[1]

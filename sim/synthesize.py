@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from calib.chain.model import CellModel, evaluate
-from calib.chain.projection import project
 from calib.chain.state import ChainState
 from calib.views import BoolArray, FloatArray, Views
 from sim.arm import Repeatability
@@ -68,7 +67,7 @@ def synthesize_corners(
     """
     errors = repeatability.draw(arm_rng, (len(log),))
     state = evaluate(model, log, flange_error=errors)
-    corners = project(state.optics, state.camera_from_board, state.points_m)
+    corners = state.pixels()
     corners += corner_sigma_px * corner_rng.standard_normal(corners.shape)
     corners[~_visible(state, corners, log)] = np.nan
     focus = state.distance_m if log_focus else log.focus_distance_m
@@ -77,8 +76,7 @@ def synthesize_corners(
 
 def true_corners(cell: SimulatedCell, log: Views) -> FloatArray:
     """(N, M, 2) pixels without any scatter, in the picture or not."""
-    state = evaluate(cell.model, log)
-    return project(state.optics, state.camera_from_board, state.points_m)
+    return evaluate(cell.model, log).pixels()
 
 
 def _visible(state: ChainState, corners_px: FloatArray, log: Views) -> BoolArray:

@@ -11,7 +11,6 @@ import numpy as np
 from calib.chain import rigid
 from calib.chain.effect import LINKS, Link, Present
 from calib.chain.kinematics import ArmKinematics, arm
-from calib.chain.projection import project
 from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 
@@ -222,5 +221,4 @@ def predict(
     model: CellModel, views: Views, *, flange_error: FloatArray | None = None
 ) -> FloatArray:
     """(N, M, 2) pixels at which this cell shows the corners at the logged poses."""
-    state = evaluate(model, views, flange_error=flange_error)
-    return project(state.optics, state.camera_from_board, state.points_m)
+    return evaluate(model, views, flange_error=flange_error).pixels()

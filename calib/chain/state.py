@@ -10,10 +10,14 @@ import numpy as np
 from calib.chain import rigid
 from calib.chain.kinematics import ArmKinematics
 from calib.chain.optics import COLUMN
+from calib.chain.projection import project
 from calib.views import FloatArray, Views
 
 DOWN_IN_BASE = np.array([0.0, 0.0, -1.0])
 """Gravity's direction in the robot base: the base is taken to stand upright."""
+
+_FIELD_STEPS = 8
+"""A field changes by a few hundredths of a pixel over a pixel: each step gains two digits."""
 
 
 @dataclass
@@ -40,6 +44,8 @@ class ChainState:
         (M, 3) the board's corners as they are.
     optics:
         (N, K) the lens and the sensor in each frame; nobody looks at it before the lens's turn.
+    picture_fields:
+        Each gives the (..., 2) pixels by which a corner seen at (..., 2) is displaced there.
     logged:
         What follows from the log and the arm alone, kept by `once`.
     """
@@ -53,6 +59,7 @@ class ChainState:
     points_m: FloatArray
     optics: FloatArray
     dh_offset: FloatArray | None = None
+    picture_fields: tuple[Callable[[FloatArray], FloatArray], ...] = ()
     camera_from_board: FloatArray = field(default_factory=lambda: np.empty((0, 4, 4)))
     logged: dict[str, FloatArray] = field(default_factory=dict)
 
@@ -133,6 +140,19 @@ class ChainState:
         """Work out where the camera sees the board."""
         camera_from_base = rigid.inverse(self.base_from_camera)
         self.camera_from_board = rigid.product(camera_from_base, self.base_from_board)
+
+    def straightened(self, seen_px: FloatArray) -> FloatArray:
+        """(N, M, 2) where the lens alone would have shown what is seen at (N, M, 2) pixels."""
+        displaced = (field(seen_px) for field in self.picture_fields)
+        return np.asarray(seen_px - sum(displaced)) if self.picture_fields else seen_px
+
+    def pixels(self) -> FloatArray:
+        """(N, M, 2) where the corners are seen."""
+        ideal = project(self.optics, self.camera_from_board, self.points_m)
+        seen = ideal
+        for _ in range(_FIELD_STEPS if self.picture_fields else 0):
+            seen = ideal + seen - self.straightened(seen)
+        return seen
 
     def pose_by_flange(self) -> FloatArray:
         """(N, 6, 6) increment of camera_from_board for a small increment of the flange."""

@@ -22,7 +22,7 @@ from calib.chain.empirical import (
 )
 from calib.chain.model import evaluate
 from calib.chain.state import ChainState
-from calib.discovery.fields import field_scores
+from calib.discovery.fields import BOARD_HEIGHT, IMAGE_FIELD, field_scores
 from calib.discovery.score import Score, conditional, extended, group_score
 from calib.solver.joint import JointFit, assemble, frame_errors
 from calib.solver.unknowns import amounts, prior_information
@@ -67,7 +67,7 @@ class Cell:
     @property
     def is_field(self) -> bool:
         """Whether it is a field of shifts over the image or the board."""
-        return self.curve is None and self.law is None
+        return self.site in (IMAGE_FIELD, BOARD_HEIGHT)
 
     @property
     def p_value(self) -> float:

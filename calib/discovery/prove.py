@@ -61,12 +61,13 @@ def floor_of(model: CellModel, views: Views, noise: Noise) -> Floor:
     columns = np.concatenate([j_optics[..., list(found.active)], j_pose], axis=-1)
     jacobian = columns @ found.own[:, None]
     spread = np.linalg.inv(noise.own_information)
+    seen_px = state.straightened(views.corners_px)
     square, nll = [], 0.0
     for i in range(len(views)):
         seen = views.seen[i]
         j = jacobian[i, seen].reshape(-1, len(spread))
         covariance = j @ spread @ j.T + noise.corner_px**2 * np.eye(len(j))
-        miss = (views.corners_px[i, seen] - pixels[i, seen]).ravel()
+        miss = (seen_px[i, seen] - pixels[i, seen]).ravel()
         _, log_det = np.linalg.slogdet(covariance)
         nll += 0.5 * float(miss @ np.linalg.solve(covariance, miss) + log_det)
         square.append(np.diag(covariance).reshape(-1, 2).sum(axis=1))

@@ -10,6 +10,7 @@ from calib.chain.model import evaluate
 from calib.discovery.laws.arm_field import with_arm_field
 from calib.discovery.laws.contest import as_cell, demanded
 from calib.discovery.laws.review import drop_beside_kinematics, drop_unsupported, replaced_by_laws
+from calib.discovery.laws.surface_field import SurfaceField, demanded_field, put_in
 from calib.discovery.locate import Cell, locate
 from calib.discovery.search import Search
 from calib.discovery.spread import stands_out
@@ -90,7 +91,7 @@ def _carried(search: Search) -> list[Cell]:
     views = search.views
     for _ in range(_MOST_CURVES):
         known = sum(cell.score.gain for cell in found)
-        law = _law(search, _REMAINDER * known)
+        law = _field_or_law(search, _REMAINDER * known)
         if law is not None:
             found.append(law)
             continue
@@ -106,20 +107,31 @@ def _carried(search: Search) -> list[Cell]:
     return found
 
 
-def _law(search: Search, least: float) -> Cell | None:
-    """Take in the law that is demanded, and see which names are still needed beside it.
+def _field_or_law(search: Search, least: float) -> Cell | None:
+    """Take in the field or the law that is demanded more, and see which names are still needed.
 
-    What gains less than `least` is what the laws before it have left of their own.
+    What gains less than `least` is what those before it have left of their own.
     """
-    before = search.best
+    field, before = demanded_field(search), search.best
     reported = demanded(search)
-    if not reported:
-        return None
-    cell = as_cell(reported, before)
-    if cell.score.gain < least or is_shape_of_law(cell, search):
+    law = as_cell(reported, before) if reported else None
+    if field is not None and (law is None or field[0].gain > law.score.gain):
+        return _carry_field(search, *field, least)
+    if law is None or law.score.gain < least or is_shape_of_law(law, search):
         return None
     search.take_in(reported[0].candidate, reported[0].trial.fit)
     search.run()
+    return law
+
+
+def _carry_field(search: Search, field: SurfaceField, cell: Cell, least: float) -> Cell | None:
+    """Carry a field, and see which names are still needed beside it."""
+    if field.gain < least or is_shape_of_law(cell, search):
+        return None
+    search.drop_beside_field(cell.site, cell.score.gain)
+    put_in(search, field)
+    search.run()
+    search.drop_beside_field(cell.site, cell.score.gain)
     return cell
 
 

@@ -109,6 +109,7 @@ class Search:
         self.branch_price = branch_price
         self.fitter, self.views = fitter, fitter.views
         self.choices: dict[str, float] = {}
+        self.prices: dict[str, float] = {}
         self.best = Trial(start, criterion(start, fitter.views))
         self.steps: list[Step] = []
 
@@ -174,11 +175,12 @@ class Search:
         return bic(score.gain, score.columns, self.views) - price
 
     def _price(self, effects: Sequence[Present], picked: Candidate | None = None) -> float:
-        """Price of picking the best among shapes, and once among branches of the arm."""
+        """Price of picking the best among shapes, of fields, and once among branches of the arm."""
         choices = dict(self.choices)
         if picked is not None:
             choices[picked.effect.label] = self._choices(picked)
         price = 2.0 * sum(float(np.log(choices.get(p.effect.label, 1))) for p in effects)
+        price += sum(self.prices.get(p.effect.label, 0.0) for p in effects)
         on_joints = any("joints_rad" in p.effect.needs for p in effects)
         return price + (self.branch_price if on_joints else 0.0)
 
@@ -381,7 +383,8 @@ class Search:
         by themselves is held against curves in its own link only.
         """
         for present in self.best.fit.model.effects:
-            curves = [p for p in self.best.fit.model.effects if p.effect.name == UNNAMED]
+            unnamed = [p for p in self.best.fit.model.effects if p.effect.name == UNNAMED]
+            curves = [p for p in unnamed if p.free]
             share = _POSE_SHARE
             if present.effect.seen_without_robot:
                 share = _BESIDE_SHARE

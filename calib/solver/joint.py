@@ -181,7 +181,7 @@ def assemble(
             state.optics[block],
             state.camera_from_board[block],
             state.points_m,
-            views.corners_px[block],
+            state.straightened(views.corners_px[block]),
             weight[block],
             found.active,
             found.modes,
@@ -252,7 +252,7 @@ class _Iteration:
         """Penalised square sum at that state, for the present weights."""
         seen = evaluate(at.model, self.views, kinematics=self.arm, **frame_errors(at.own_error))
         pixels = project(seen.optics, seen.camera_from_board, seen.points_m)
-        square = np.nansum((self.views.corners_px - pixels) ** 2, axis=2)
+        square = np.nansum((seen.straightened(self.views.corners_px) - pixels) ** 2, axis=2)
         cost = float(np.sum(self.weight * square)) / at.noise.corner_px**2
         pull = at.own_error @ at.noise.own_information
         cost += float(np.sum(pull * at.own_error))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from calib.chain.optics import COLUMN
 from calib.views import Board, FloatArray
 from sim.render.coverage import integrate
@@ -22,6 +24,7 @@ def render(
     width_px: int,
     height_px: int,
     blur: Blur | None = None,
+    straightened: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Image:
     """Mean reflectance seen by every pixel.
 
@@ -37,13 +40,16 @@ def render(
         Size of the image.
     blur:
         The lens's focus; sharp everywhere where it is None.
+    straightened:
+        Where the lens alone would show what is seen at (Q, 2) pixels; there where it is None.
 
     Returns
     -------
     (height_px, width_px) float32 between 0 and 1. Raises `ValueError` for a board that cannot
     be printed.
     """
-    nodes = look(Surface(board, points_m), optics, camera_from_board, width_px, height_px)
+    surface = Surface(board, points_m)
+    nodes = look(surface, optics, camera_from_board, width_px, height_px, straightened)
     image = integrate(pattern_of(board), nodes, width_px, height_px)
     if blur is None:
         return image

@@ -7,6 +7,7 @@ corner (distortion, warp, tilt, shutter) happens to every printed edge.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -103,6 +104,7 @@ def look(
     camera_from_board: FloatArray,
     width_px: int,
     height_px: int,
+    straightened: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Nodes:
     """Meet the surface along the lines of sight of a grid of pixels.
 
@@ -114,6 +116,8 @@ def look(
         (K,) and (4, 4): the frame's camera and pose.
     width_px, height_px:
         Size of the image.
+    straightened:
+        Where the lens alone would show what is seen at (Q, 2) pixels; there where it is None.
     """
     rows, cols = (int(np.ceil(n / NODE_STEP_PX)) + 3 for n in (height_px, width_px))
     v, u = np.meshgrid(
@@ -122,6 +126,8 @@ def look(
         indexing="ij",
     )
     target = np.stack([u.ravel(), v.ravel()], axis=1)
+    if straightened is not None:
+        target = straightened(target)
     s, t, met = _newton(surface, optics, camera_from_board, target)
     point, _, _ = surface.point(s, t)
     depth = point @ camera_from_board[2, :3] + camera_from_board[2, 3]

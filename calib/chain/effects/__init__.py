@@ -14,6 +14,8 @@ from calib.chain.effect import Effect, Present
 from calib.chain.empirical import UNNAMED, empirical_from
 from calib.chain.laws.arm_field import FIELD, field_from
 from calib.chain.laws.law import law_from
+from calib.chain.laws.surface_field import SURFACES
+from calib.chain.laws.surface_field import field_from as surface_from
 
 
 @cache
@@ -66,6 +68,8 @@ def _unnamed(law: str, numbers: Mapping[str, float]) -> Present:
     """Return the law, field or curve that a file tells."""
     if law.startswith(FIELD):
         return field_from(law, numbers)
+    if law in {surface.law for surface in SURFACES}:
+        return surface_from(law, numbers)
     return law_from(law, numbers) if ":" in law else empirical_from(law, numbers)
 
 

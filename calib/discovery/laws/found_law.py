@@ -10,6 +10,7 @@ import numpy as np
 from calib.chain.effect import Present
 from calib.chain.laws.arm_field import rms
 from calib.chain.laws.law import Law, law_of
+from calib.chain.laws.surface_field import surface_of
 from calib.discovery.diagnosis import FoundLaw, Value
 from calib.discovery.laws.arm_field import is_arm_field
 from calib.solver.joint import JointFit
@@ -60,7 +61,13 @@ def found_law(
 ) -> FoundLaw:
     """What is known of the law that is effect `index` of the twin."""
     if is_arm_field(twin.model.effects[index]):
+<<<<<<< HEAD:calib/discovery/laws/found_law.py
         return _found_field(twin.model.effects[index], holdout_gain_px)
+=======
+        return _told_field(twin.model.effects[index], holdout_gain_px)
+    if surface_of(twin.model.effects[index]) is not None:
+        return _told_surface(twin.model.effects[index], holdout_gain_px)
+>>>>>>> 7d609d2 (Carry a field of shifts over the picture and of heights over the board: found before, it predicted nothing):calib/discovery/laws/telling.py
     fitted = _fitted(twin, index)
     law = law_of(fitted.present)
     swings = law.form.key == "periodic"
@@ -86,6 +93,22 @@ def _found_field(present: Present, holdout_gain_px: float) -> FoundLaw:
             "rms_rad": Value(size_rad, 0.0, "rad"),
             "length_scale": Value(given["length_scale"], 0.0, "rad"),
             "share_of_scatter": Value(given["share"], 0.0, "1"),
+        },
+        holdout_gain_px=holdout_gain_px,
+        rivals=(),
+    )
+
+
+def _found_surface(present: Present, holdout_gain_px: float) -> FoundLaw:
+    surface, given = surface_of(present), present.as_mapping()
+    assert surface is not None
+    return FoundLaw(
+        form="field",
+        equation=present.effect.equation,
+        covariates=(surface.covariate,),
+        parameters={
+            f"{name}_{surface.unit}": Value(given[name], given[f"{name}_sigma"], surface.unit)
+            for name in ("rms", "length_scale")
         },
         holdout_gain_px=holdout_gain_px,
         rivals=(),

@@ -188,7 +188,7 @@ def _raw(fit: JointFit, views: Views, found: Dependence, mapping: FloatArray) ->
         state.optics,
         state.camera_from_board,
         state.points_m,
-        views.corners_px,
+        state.straightened(views.corners_px),
         fit.weight,
         found.active,
         found.modes,

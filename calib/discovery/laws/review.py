@@ -138,13 +138,14 @@ def drop_unsupported(search: Search, *, beside_field: bool = False) -> None:
     `beside_field`: a field of shifts is left, whose edges a lens effect fits without being there;
     its name then has to place the left-out corners better, too.
     """
-    while search.best.fit.model.effects:
+    while fitted := [k for k, p in enumerate(search.best.fit.model.effects) if p.free]:
         fit = search.best.fit
         checked = CrossValidation(fit, frame_blocks(fit, search.views))
-        worth = [checked.without(k) for k in range(len(fit.model.effects))]
+        effects = [fit.model.effects[k] for k in fitted]
+        worth = [checked.without(k) for k in fitted]
         wanted = [
             w.supported and not (beside_field and _in_camera(p) and w.gain_px <= 0.0)
-            for w, p in zip(worth, fit.model.effects, strict=True)
+            for w, p in zip(worth, effects, strict=True)
         ]
         if all(wanted):
             return
@@ -152,7 +153,7 @@ def drop_unsupported(search: Search, *, beside_field: bool = False) -> None:
             (k for k, is_wanted in enumerate(wanted) if not is_wanted),
             key=lambda k: worth[k].minus_two_log,
         )
-        search.leave_out(fit.model.effects[least])
+        search.leave_out(effects[least])
 
 
 def _in_camera(present: Present) -> bool:

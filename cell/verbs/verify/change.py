@@ -130,7 +130,7 @@ class _Fit:
     def cost(self, state: _State) -> float:
         seen = evaluate(self.model(state), self.views, flange_error=state.flange_error)
         pixels = project(seen.optics, seen.camera_from_board, seen.points_m)
-        square = np.nansum((self.views.corners_px - pixels) ** 2, axis=2)
+        square = np.nansum((seen.straightened(self.views.corners_px) - pixels) ** 2, axis=2)
         cost = float((self.weight * square).sum()) / self.noise.corner_px**2
         error = state.flange_error
         cost += float(np.sum((error @ self.noise.flange_information) * error))

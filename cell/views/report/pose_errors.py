@@ -123,7 +123,7 @@ def _linear(
     """Residuals (N, M, 2) and Jacobians by pose and optics, zero where no corner was seen."""
     pixels, j_pose, j_optics = project_with_jacobians(optics, pose, state.points_m)
     seen = views.seen[..., None]
-    residual = np.where(seen, np.nan_to_num(views.corners_px) - pixels, 0.0)
+    residual = np.where(seen, np.nan_to_num(state.straightened(views.corners_px)) - pixels, 0.0)
     return residual, np.where(seen[..., None], j_pose, 0.0), j_optics * seen[..., None]
 
 
