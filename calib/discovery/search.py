@@ -341,7 +341,7 @@ class Search:
         bends: no name rests on that.
         """
         demand = {step.taken.effect.label: step.demand for step in self.steps}
-        for present in self.best.fit.model.effects:
+        for present in [p for p in self.best.fit.model.effects if p.free]:
             rest = tuple(p for p in self.best.fit.model.effects if p.effect != present.effect)
             without = self.fitter.with_effects(self.best.fit, rest)
             if present.effect.seen_without_robot:
