@@ -61,13 +61,9 @@ def found_law(
 ) -> FoundLaw:
     """What is known of the law that is effect `index` of the twin."""
     if is_arm_field(twin.model.effects[index]):
-<<<<<<< HEAD:calib/discovery/laws/found_law.py
         return _found_field(twin.model.effects[index], holdout_gain_px)
-=======
-        return _told_field(twin.model.effects[index], holdout_gain_px)
     if surface_of(twin.model.effects[index]) is not None:
-        return _told_surface(twin.model.effects[index], holdout_gain_px)
->>>>>>> 7d609d2 (Carry a field of shifts over the picture and of heights over the board: found before, it predicted nothing):calib/discovery/laws/telling.py
+        return _found_surface(twin.model.effects[index], holdout_gain_px)
     fitted = _fitted(twin, index)
     law = law_of(fitted.present)
     swings = law.form.key == "periodic"

@@ -300,7 +300,7 @@ def _blank(present: Present, surface: Surface) -> Present:
 
 
 def _of(state: ChainState, views: Views, frames: NDArray[np.int64]) -> ChainState:
-    """The walk's end of some frames."""
+    """The chain's end state of some frames."""
     return replace(
         state,
         views=views.take(frames),
