@@ -73,7 +73,7 @@ def _line(trial: Trial) -> str:
             f" {1e3 * trial.found.mounted_sigma_m.max():.2f}), alpha {trial.found.alpha_px:.0f}"
         )
         if not trial.error:
-            parts.append("{} of {} views whole".format(*trial.planned_views_whole()))
+            parts.append("{} of {} views whole".format(*trial.planned_views_seen_whole()))
     return "; ".join(parts)
 
 
@@ -83,7 +83,7 @@ def _sum_up(name: str, trials: list[Trial]) -> None:
         print(f"{name}: none of {len(trials)} planned")
         return
     off = np.array([trial.mounted_error() for trial in done]).reshape(-1, 2)
-    seen = np.array([trial.planned_views_whole() for trial in done]).reshape(-1, 2)
+    seen = np.array([trial.planned_views_seen_whole() for trial in done]).reshape(-1, 2)
     broken = sum(bool(trial.violations()) for trial in trials)
     print(
         f"{name}: {len(done)} of {len(trials)} planned; hand-eye off by"

@@ -67,10 +67,10 @@ def main(versions: list[str]) -> int:
             model.mkdir()
             write_model(model)
             for files in ("rigs.txt and frames.txt", "images.txt alone"):
-                said = subprocess.run(
+                output = subprocess.run(
                     [python, "-c", READ, model], check=True, capture_output=True, text=True
                 ).stdout.split()
-                posed, images, off_px = int(said[0]), int(said[1]), float(said[2])
+                posed, images, off_px = int(output[0]), int(output[1]), float(output[2])
                 bad |= posed != images or not off_px < 1e-6
                 print(f"pycolmap {version}, {files}: {posed} of {images} posed, {off_px:.1e} px")
                 for name in ("rigs.txt", "frames.txt"):

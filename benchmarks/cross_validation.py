@@ -108,8 +108,8 @@ def table(runs: Iterable[Run]) -> list[str]:
     runs = list(runs)
     for case in CASES:
         own = [r for r in runs if r.case == case]
-        said = Counter(r.verdict for r in own)
-        counts = [said[v] for v in ("agree", "sigma_too_small", "single_frames")]
+        verdicts = Counter(r.verdict for r in own)
+        counts = [verdicts[v] for v in ("agree", "sigma_too_small", "single_frames")]
         numbers = " | ".join(str(c) for c in counts)
         factors = [r.factor for r in own if r.factor > 1.0]
         factor = f"{np.median(factors):.2f}" if factors else "–"

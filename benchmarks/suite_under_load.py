@@ -51,15 +51,15 @@ def run(words: list[str]) -> tuple[bool, str]:
     began_s = time.monotonic()
     command = [sys.executable, "-m", "pytest", "-rfE", *words]
     wide = os.environ | {"COLUMNS": "200"}  # or the reasons of failures are cut off
-    said = subprocess.run(command, cwd=ROOT, env=wide, capture_output=True, text=True, check=False)
-    counted = {what: int(count) for count, what in _COUNTED.findall(said.stdout[-400:])}
-    failed = re.findall(r"(?m)^(?:FAILED|ERROR) .*$", said.stdout)
+    run_ = subprocess.run(command, cwd=ROOT, env=wide, capture_output=True, text=True, check=False)
+    counted = {what: int(count) for count, what in _COUNTED.findall(run_.stdout[-400:])}
+    failed = re.findall(r"(?m)^(?:FAILED|ERROR) .*$", run_.stdout)
     line = (
         f"{counted.get('passed', 0)} passed, {len(failed)} failed,"
         f" {time.monotonic() - began_s:.0f} s, load {os.getloadavg()[0]:.1f}"
     )
-    unforeseen = [] if said.returncode in (0, 1) else [said.stdout[-2000:] + said.stderr[-2000:]]
-    return said.returncode == 0, "\n    ".join([line, *failed, *unforeseen])
+    unforeseen = [] if run_.returncode in (0, 1) else [run_.stdout[-2000:] + run_.stderr[-2000:]]
+    return run_.returncode == 0, "\n    ".join([line, *failed, *unforeseen])
 
 
 def main() -> None:

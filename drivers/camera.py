@@ -64,7 +64,7 @@ class Camera(Protocol):
         """Focus, wait until ready, return the position read back (None: unknown)."""
 
     def grab(self, timeout_s: float) -> Frame:
-        """Trigger and return the frame of this trigger, never an older one; raises `FrameLost`."""
+        """Trigger and return this trigger's frame, never an older one; raises `FrameMissing`."""
 
     def close(self) -> None:
         """Stop the stream and let go of the camera. Idempotent."""

@@ -5,7 +5,7 @@
     DeviceError                 a device failed or answered nonsense          exit status 3
     ├── DeviceUnreachable       no connection, or the connection was lost
     ├── DeviceRefused           it answers, and says no (local mode, held by another program, ...)
-    ├── FrameLost               no whole frame came; the next trigger may succeed
+    ├── FrameMissing               no whole frame came; the next trigger may succeed
     └── ArmStopped              the arm stopped by itself: protective stop, emergency stop, fault
     SafetyError                 a limit of ours refused or stopped a motion   exit status 5
     └── StopFailed              the arm was told to stop and did not confirm it
@@ -28,7 +28,7 @@ class DeviceRefused(DeviceError):
     """The device answers and refuses: local mode, held by another program, no licence."""
 
 
-class FrameLost(DeviceError):
+class FrameMissing(DeviceError):
     """No whole frame came within the time; triggering again may succeed."""
 
 

@@ -100,7 +100,7 @@ class GenICamCamera(ABC):
         ------
         DeviceRefused
             The exposure does not fit into `timeout_s`.
-        FrameLost
+        FrameMissing
             No whole frame came in time.
         DeviceUnreachable
             The camera is lost; `connect` reopens it.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera import FocusSetting, Frame
-from drivers.errors import DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceRefused, DeviceUnreachable, FrameMissing
 from drivers.focus import FocusControl, FocusNames
 from drivers.genicam_pixels import decode
 from drivers.genicam_session import IncompleteFrame, RawFrame, Session
@@ -124,7 +124,7 @@ class OpenCamera:
                 self._unanswered_trigger = False
             try:
                 return self._frame(self._take(deadline_s, missed))
-            except (IncompleteFrame, ValueError, FrameLost) as error:
+            except (IncompleteFrame, ValueError, FrameMissing) as error:
                 if time.monotonic() + self.values.get("exposure_s", 0.0) >= deadline_s:
                     raise self._lost_frame(missed, error) from None
                 _log.info("%s: %s; triggering again", self._device, error)
@@ -209,11 +209,11 @@ class OpenCamera:
                 return raw
             if self.lost:
                 raise DeviceUnreachable(f"{self._device}: the connection was lost; connect again")
-        raise FrameLost(f"no frame came within {time.monotonic() - begun_s:.2f} s")
+        raise FrameMissing(f"no frame came within {time.monotonic() - begun_s:.2f} s")
 
-    def _lost_frame(self, missed: list[str], last: Exception) -> FrameLost:
+    def _lost_frame(self, missed: list[str], last: Exception) -> FrameMissing:
         tries = "; ".join([*missed, str(last)])
-        return FrameLost(
+        return FrameMissing(
             f"{self._device}: {tries}. If this happens with every trigger, no packet of this size "
             "may pass the network (MTU), or a firewall drops the stream"
         )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from drivers.bounded import Bounded
 from drivers.camera import FocusSetting, Frame
-from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameMissing
 from drivers.robotiq_http import PORT, RobotiqHttp
 from drivers.robotiq_settings import NO_SETTINGS, RobotiqSettings, values_of
 from drivers.untried import warn_untried
@@ -87,7 +87,7 @@ class RobotiqCamera:
         return self._ask(lambda end: self._focus(setting, end), 2 * _SETTING_S, "focus")
 
     def grab(self, timeout_s: float) -> Frame:
-        """A picture exposed after this call; raises `FrameLost` when none comes.
+        """A picture exposed after this call; raises `FrameMissing` when none comes.
 
         Raises
         ------
@@ -202,7 +202,7 @@ class RobotiqCamera:
         while time.monotonic() < deadline_s - 2 * _REPEATED_PAUSE_S:
             try:
                 body = http.picture(deadline_s)
-            except FrameLost as error:
+            except FrameMissing as error:
                 lost = str(error)
                 continue
             except DeviceUnreachable:
@@ -214,12 +214,12 @@ class RobotiqCamera:
                 return body
             lost = f"{self.device}: the server only repeats its last picture"
             time.sleep(_REPEATED_PAUSE_S)
-        raise FrameLost(lost or f"{self.device}: no picture came in time")
+        raise FrameMissing(lost or f"{self.device}: no picture came in time")
 
     def _decoded(self, body: bytes) -> NDArray[np.generic]:
         image = cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_UNCHANGED)
         if image is None:
-            raise FrameLost(f"{self.device}: the picture cannot be decoded")
+            raise FrameMissing(f"{self.device}: the picture cannot be decoded")
         return np.asarray(image)
 
 

@@ -10,7 +10,7 @@ import json
 from typing import Any
 
 from drivers.bounded_http import BoundedHttp, NoAnswer
-from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameMissing
 from drivers.jpeg import jpeg_size
 
 PORT = 4242
@@ -32,7 +32,7 @@ class RobotiqHttp:
 
         Raises
         ------
-        FrameLost
+        FrameMissing
             What came is cut short or no JPEG.
         DeviceRefused
             The picture has more pixels than `MOST_PIXELS`; it was not decoded.
@@ -40,7 +40,7 @@ class RobotiqHttp:
         body = self._request("GET", "/current.jpg?type=color", None, deadline_s)
         size = jpeg_size(body)
         if size is None or not body.rstrip(b"\0").endswith(b"\xff\xd9"):
-            raise FrameLost(f"{self.name}: what came as a picture is no whole JPEG file")
+            raise FrameMissing(f"{self.name}: what came as a picture is no whole JPEG file")
         if size[0] * size[1] > MOST_PIXELS:
             raise DeviceRefused(
                 f"{self.name}: a picture of {size[0]} x {size[1]} pixels came, which no such camera"
@@ -79,7 +79,7 @@ class RobotiqHttp:
             status, answer = self._http.ask(verb, path, deadline_s, body, "text/plain")
         except NoAnswer as error:
             if error.cut_short:
-                raise FrameLost(f"{self.name}: the answer was cut short") from None
+                raise FrameMissing(f"{self.name}: the answer was cut short") from None
             raise DeviceUnreachable(
                 f"{self.name}: {error}; check the robot's address and that the Robotiq "
                 "camera's URCap runs"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 
 _log = logging.getLogger("cell.drivers")
-_said: set[str] = set()
+_warned: set[str] = set()
 
 
 def warn_untried(
@@ -24,9 +24,9 @@ def warn_untried(
     advice:
         What the operator should do about it.
     """
-    if device in _said:
+    if device in _warned:
         return
-    _said.add(device)
+    _warned.add(device)
     _log.warning(
         "%s: this driver was tried on %s, never on the real machine. %s",
         device,

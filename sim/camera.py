@@ -13,7 +13,7 @@ from calib.chain.model import CellModel, evaluate
 from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 from drivers.camera import FocusSetting, Frame
-from drivers.errors import DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceRefused, DeviceUnreachable, FrameMissing
 from sim.arm import ArmTruth
 from sim.cell import SENSOR_STREAM, SimulatedCell
 from sim.clock import Clock
@@ -126,12 +126,12 @@ class SimCamera:
         return self._focus_position()
 
     def grab(self, timeout_s: float) -> Frame:
-        """Expose and render; raises `FrameLost` where that was asked for."""
+        """Expose and render; raises `FrameMissing` where that was asked for."""
         self._check_alive(self._connected_s is not None)
         if self.faults.lose_frames > 0:
             self.faults.lose_frames -= 1
             self._clock.sleep(timeout_s)
-            raise FrameLost(f"simulated camera: no frame within {timeout_s} s")
+            raise FrameMissing(f"simulated camera: no frame within {timeout_s} s")
         self._clock.sleep(0.5 * self._exposure_s)
         middle_s = self._clock.now()
         self._seen.append(self._seen_now())

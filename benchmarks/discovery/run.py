@@ -217,10 +217,10 @@ def _located(
         return False, False, False
     if case.hidden:
         return first.link in what.links, None, None
-    said = {first.covariate} | set(first.law.covariates if first.law else ())
+    covariates = {first.covariate} | set(first.law.covariates if first.law else ())
     return (
         first.link in what.links,
-        any(c in s or s in c for c in what.covariates for s in said),
+        any(c in s or s in c for c in what.covariates for s in covariates),
         None if first.law is None else first.law.form in what.forms,
     )
 

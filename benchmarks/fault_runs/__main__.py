@@ -74,7 +74,7 @@ def _print(stand: str, fault: Fault, trials: list[Trial]) -> int:
     )
     for one in trials:
         for complaint in one.complaints:
-            print(f"{stand}: {fault.name}: {complaint}\n{one.said}", file=sys.stderr)
+            print(f"{stand}: {fault.name}: {complaint}\n{one.output}", file=sys.stderr)
     return len(trials) - good
 
 

@@ -100,11 +100,11 @@ def complaints(kind: Disturbance, trial: StopTrial) -> list[str]:
     found = []
     if trial.exit_status != _SAFETY:
         found.append(f"exit status {trial.exit_status}, not {_SAFETY}")
-    if re.search(kind.words, trial.said) is None:
+    if re.search(kind.words, trial.output) is None:
         found.append(f"the operator is not told '{kind.words}'")
     if kind.stands and trial.moving:
         found.append("the arm moved when the run said what became of it")
-    if "Traceback" in trial.said:
+    if "Traceback" in trial.output:
         found.append("a traceback")
     return found
 
@@ -199,7 +199,7 @@ def main() -> None:
                 for trial in trials:
                     for complaint in complaints(kind, trial):
                         bad += 1
-                        print(f"{name}: {kind.name}: {complaint}\n{trial.said}", file=sys.stderr)
+                        print(f"{name}: {kind.name}: {complaint}\n{trial.output}", file=sys.stderr)
                 bad += words.instants - len(trials)
     sys.exit(bool(bad))
 

@@ -42,7 +42,7 @@ class Fault:
         Brings it about. One that the run survives puts it right again, too.
     exits:
         The exit statuses that the contract has for it.
-    words:
+    patterns:
         Patterns of what the operator must be told: what happened, what to do.
     halt_s:
         The longest that the arm may move on after it; None where it may until the run's end.
@@ -57,7 +57,7 @@ class Fault:
     name: str
     happen: Act
     exits: tuple[int, ...] = (_DEVICE,)
-    words: tuple[str, ...] = ()
+    patterns: tuple[str, ...] = ()
     halt_s: float | None = None
     survived: bool = False
     restore: Act = _nothing
@@ -96,10 +96,10 @@ def _child_of(launch: Launch, script: str) -> int | None:
             continue
         try:
             parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-            words = (entry / "cmdline").read_bytes()
+            patterns = (entry / "cmdline").read_bytes()
         except (OSError, IndexError):
             continue
-        if parent == launch.pid and script.encode() in words:
+        if parent == launch.pid and script.encode() in patterns:
             return int(entry.name)
     return None
 
@@ -170,28 +170,28 @@ _UR = (
     Fault(
         "protective stop",
         lambda stand, _: stand.arm.protective_stop(),
-        words=("protective stop", "clear it", RESUMES),
+        patterns=("protective stop", "clear it", RESUMES),
         halt_s=0.6,
         restore=_unlock,
     ),
     Fault(
         "emergency stop",
         lambda stand, _: stand.arm.emergency_stop(),
-        words=("emergency stop", "release the button", RESUMES),
+        patterns=("emergency stop", "release the button", RESUMES),
         halt_s=0.6,
         restore=_restore_arm,
     ),
     Fault(
         "program stopped at the pendant",
         lambda stand, _: stand.arm.stop_program("teach pendant"),
-        words=("teach pendant", RESUMES),
+        patterns=("teach pendant", RESUMES),
         halt_s=0.6,
         possible=_plays,
     ),
     Fault(
         "local mode",
         _local,
-        words=("local mode", "Remote Control", RESUMES),
+        patterns=("local mode", "Remote Control", RESUMES),
         halt_s=1.5,
         restore=_restore_arm,
     ),
@@ -199,7 +199,7 @@ _UR = (
         "controller mute",
         _mute,
         exits=(_SAFETY,),
-        words=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
+        patterns=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
         halt_s=1.0,
         restore=_restore_arm,
     ),
@@ -207,14 +207,14 @@ _UR = (
         "cable cut",
         lambda stand, _: stand.arm.cut(),
         exits=(_SAFETY,),
-        words=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
+        patterns=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
         halt_s=1.0,
         restore=_restore_arm,
     ),
     Fault(
         "connections dropped",
         lambda stand, _: stand.arm.drop(),
-        words=("UR", RESUMES),
+        patterns=("UR", RESUMES),
         halt_s=0.6,
         possible=_plays,
     ),
@@ -222,21 +222,21 @@ _UR = (
         "controller dies",
         lambda stand, _: stand.arm.kill(),
         exits=(_SAFETY,),
-        words=_NOBODY_KNOWS,
+        patterns=_NOBODY_KNOWS,
         halt_s=0.6,
         restore=_revive_arm,
     ),
     Fault(
         "ur-rtde dies",
         _signals_child(_UR_CHILD, signal.SIGKILL),
-        words=("the process that moves the arm ended", RESUMES),
+        patterns=("the process that moves the arm ended", RESUMES),
         halt_s=0.8,
         possible=_has_child(_UR_CHILD),
     ),
     Fault(
         "ur-rtde hangs",
         _signals_child(_UR_CHILD, signal.SIGSTOP),
-        words=("watchdog|did not start|did not take", RESUMES),
+        patterns=("watchdog|did not start|did not take", RESUMES),
         halt_s=1.0,
         possible=_has_child(_UR_CHILD),
     ),
@@ -294,9 +294,9 @@ def _camera_mute(stand: Stand, _: Launch) -> None:
 
 _CAMERA_LOST = ("camera", "check its power|[Cc]heck|close its viewer", RESUMES)
 _GIGE = (
-    Fault("camera: power cut", _power_cut, words=_CAMERA_LOST, restore=_revive_camera),
-    Fault("camera: silent", _camera_mute, words=_CAMERA_LOST, restore=_restore_camera),
-    Fault("camera: another program takes it", _seized, words=_CAMERA_LOST, restore=_released),
+    Fault("camera: power cut", _power_cut, patterns=_CAMERA_LOST, restore=_revive_camera),
+    Fault("camera: silent", _camera_mute, patterns=_CAMERA_LOST, restore=_restore_camera),
+    Fault("camera: another program takes it", _seized, patterns=_CAMERA_LOST, restore=_released),
     Fault("camera: off and on", _power_gone_for(0.7), survived=True),
     Fault("camera: taken and given back", _seized_for(1.0), survived=True),
     Fault(
@@ -321,21 +321,21 @@ _ABB = (
     Fault(
         "guard stop",
         lambda stand, _: stand.arm.guard_stop(),
-        words=("guard", "reset the guard", RESUMES),
+        patterns=("guard", "reset the guard", RESUMES),
         halt_s=0.6,
         restore=_restore_arm,
     ),
     Fault(
         "emergency stop",
         lambda stand, _: stand.arm.emergency_stop(),
-        words=("emergency stop", "release the button", RESUMES),
+        patterns=("emergency stop", "release the button", RESUMES),
         halt_s=0.6,
         restore=_restore_arm,
     ),
     Fault(
         "key turned to manual",
         lambda stand, _: stand.arm.to_manual(),
-        words=("automatic", RESUMES),
+        patterns=("automatic", RESUMES),
         halt_s=0.6,
         restore=_restore_arm,
     ),
@@ -343,7 +343,7 @@ _ABB = (
         "cable cut",
         lambda stand, _: stand.arm.cut(),
         exits=(_SAFETY,),
-        words=_NOBODY_KNOWS,
+        patterns=_NOBODY_KNOWS,
         halt_s=1.5,
         restore=_restore_arm,
     ),
@@ -351,7 +351,7 @@ _ABB = (
         "controller dies",
         lambda stand, _: stand.arm.kill(),
         exits=(_SAFETY,),
-        words=_NOBODY_KNOWS,
+        patterns=_NOBODY_KNOWS,
         halt_s=0.6,
         restore=_revive_arm,
     ),
@@ -360,7 +360,7 @@ _ABB = (
         "Ctrl-C, and the stop is refused",
         _refuse_stop,
         exits=(_OPERATOR,),
-        words=("stopped by Ctrl-C", RESUMES),
+        patterns=("stopped by Ctrl-C", RESUMES),
         halt_s=1.0,
         restore=_restore_arm,
     ),
@@ -375,13 +375,13 @@ _ROBOTIQ = (
     Fault(
         "camera: server gone",
         lambda stand, _: stand.camera.close(),
-        words=("Robotiq", "[Cc]heck", RESUMES),
+        patterns=("Robotiq", "[Cc]heck", RESUMES),
         restore=_revive_camera,
     ),
     Fault(
         "camera: silent",
         _camera_mute,
-        words=("Robotiq", "[Cc]heck", RESUMES),
+        patterns=("Robotiq", "[Cc]heck", RESUMES),
         restore=_restore_camera,
     ),
     Fault("camera: video stands still", _camera_has(1.5, frozen=True), survived=True),

@@ -55,7 +55,7 @@ class Launch:
         return self._process.exitcode
 
     @property
-    def said(self) -> str:
+    def output(self) -> str:
         """What came on stdout and stderr so far."""
         return b"".join(self._heard).decode(errors="replace")
 

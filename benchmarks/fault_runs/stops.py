@@ -92,7 +92,7 @@ class StopTrial:
 
     Attributes
     ----------
-    order_s, halt_s, word_s:
+    order_s, halt_s, report_s:
         To the first order at the controller, to the arm's halt (both None where there was none
         while the run lasted), and to the word of it.
     moving:
@@ -101,10 +101,10 @@ class StopTrial:
 
     order_s: float | None
     halt_s: float | None
-    word_s: float
+    report_s: float
     moving: bool
     exit_status: int | None
-    said: str
+    output: str
 
     def complaints(self, kind: Kind, maker: str) -> list[str]:
         """What was not as it must be."""
@@ -116,7 +116,7 @@ class StopTrial:
             wanted = _STOPPED
         if self.exit_status != wanted:
             found.append(f"exit status {self.exit_status}, not {wanted}")
-        if wanted == _ALARM and "PRESS THE EMERGENCY STOP" not in self.said:
+        if wanted == _ALARM and "PRESS THE EMERGENCY STOP" not in self.output:
             found.append("no alarm")
         if kind.arrives and (self.order_s is None or self.order_s > _WIRE_S):
             found.append(f"the order was there after {self.order_s} s")
@@ -190,20 +190,25 @@ def seen_through(
         time.sleep(_POLL_S)
     ended_s = time.monotonic() - asked_s
     launch.finish()
-    word_s = _word_s(folder, asked_unix_s, ended_s)
+    report_s = _report_s(folder, asked_unix_s, ended_s)
     orders = [
         event.t_s - asked_s
         for event in stand.arm.events
         if event.t_s >= asked_s and event.what.startswith(_ORDERS)
     ]
     halted = next((t_s for t_s, moving in moved if not moving), None)
-    at_word = [moving for t_s, moving in moved if t_s <= word_s]
+    at_report = [moving for t_s, moving in moved if t_s <= report_s]
     return StopTrial(
-        min(orders, default=None), halted, word_s, at_word[-1], launch.exit_status, launch.said
+        min(orders, default=None),
+        halted,
+        report_s,
+        at_report[-1],
+        launch.exit_status,
+        launch.output,
     )
 
 
-def _word_s(folder: Path, asked_unix_s: float, ended_s: float) -> float:
+def _report_s(folder: Path, asked_unix_s: float, ended_s: float) -> float:
     """When the run journalled what became of the stop; its end where it did not."""
     halts = [event["at"] for event in read_journal(folder) if event["event"] == "halt"]
     at_s = datetime.fromisoformat(halts[-1]).timestamp() - asked_unix_s if halts else ended_s
@@ -242,7 +247,7 @@ def _row(name: str, kind: Kind, found: list[Any]) -> str:
         f"{confirmed} of {len(found)}",
         worst([trial.order_s for trial in trials]),
         worst([trial.halt_s for trial in trials]),
-        worst([trial.word_s for trial in trials]),
+        worst([trial.report_s for trial in trials]),
         ", ".join(sorted({str(trial.exit_status) for trial in trials})),
     ]
     return f"| {' | '.join(cells)} |"
@@ -273,7 +278,7 @@ def main() -> None:
                 for trial, complaints in found:
                     bad += bool(complaints)
                     for complaint in complaints:
-                        print(f"{name}: {kind.name}: {complaint}\n{trial.said}", file=sys.stderr)
+                        print(f"{name}: {kind.name}: {complaint}\n{trial.output}", file=sys.stderr)
                 bad += words.instants - len(found)
     sys.exit(bool(bad))
 

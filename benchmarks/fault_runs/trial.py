@@ -53,7 +53,7 @@ class Trial:
         Of the run.
     frames:
         In the recording afterwards.
-    said:
+    output:
         All that the run said.
     complaints:
         What was not as it must be.
@@ -63,7 +63,7 @@ class Trial:
     halted_s: float = 0.0
     exit_status: int | None = None
     frames: int = 0
-    said: str = ""
+    output: str = ""
     complaints: list[str] = field(default_factory=list)
 
     def demand(self, kept: bool, otherwise: str) -> None:
@@ -105,17 +105,17 @@ def trial(stand: Stand, folder: Path, fault: Fault, instant_s: float) -> Trial:
     finally:
         launch.finish()
         fault.restore(stand, launch)
-    came.exit_status, came.said = launch.exit_status, launch.said
+    came.exit_status, came.output = launch.exit_status, launch.output
     _judge(fault, came)
     _judge_recording(stand, folder, before, came)
-    if came.complaints and re.search(_TRIPPED, came.said):
-        raise Disturbed(came.said)
+    if came.complaints and re.search(_TRIPPED, came.output):
+        raise Disturbed(came.output)
     return came
 
 
 def _await(launch: Launch, stand: Stand, fault: Fault, instant_s: float) -> None:
     if not launch.began():
-        raise Disturbed(launch.said)
+        raise Disturbed(launch.output)
     if instant_s >= 0.0:
         _until(stand.truly_moving, launch)
     due_s = time.monotonic() + abs(instant_s)
@@ -125,7 +125,7 @@ def _await(launch: Launch, stand: Stand, fault: Fault, instant_s: float) -> None
 def _until(condition: Callable[[], bool], launch: Launch) -> None:
     while not condition():
         if launch.ended:
-            raise Disturbed(launch.said)
+            raise Disturbed(launch.output)
         time.sleep(_POLL_S)
 
 
@@ -168,13 +168,13 @@ def _interrupt_if_it_goes_on(launch: Launch, folder: Path, frames: int, since_s:
 def _judge(fault: Fault, came: Trial) -> None:
     exits = (4,) if fault.survived else fault.exits
     came.demand(came.exit_status in exits, f"exit status {came.exit_status}, not {exits}")
-    came.demand("Traceback" not in came.said, "a traceback")
+    came.demand("Traceback" not in came.output, "a traceback")
     if fault.halt_s is not None:
         late = f"the arm moved on for {came.halted_s:.2f} s, allowed are {fault.halt_s:g} s"
         came.demand(came.halted_s <= fault.halt_s, late)
-    last = "\n".join(came.said.splitlines()[-4:])
-    for words in fault.words:
-        came.demand(re.search(words, last) is not None, f"the operator is not told '{words}'")
+    last = "\n".join(came.output.splitlines()[-4:])
+    for patterns in fault.patterns:
+        came.demand(re.search(patterns, last) is not None, f"the operator is not told '{patterns}'")
 
 
 def _judge_recording(stand: Stand, folder: Path, before: list[bytes], came: Trial) -> None:

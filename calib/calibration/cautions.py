@@ -124,7 +124,7 @@ def _outliers(robot: RobotReference) -> Iterator[Caution]:
     if robot.outliers:
         yield Caution(
             "logged poses disagree with their pictures and were left out of the hand-eye",
-            frames_in_words(robot.outliers),
+            frames_text(robot.outliers),
             "look at these frames: a pose of another picture, or an arm or board that was moved",
         )
 
@@ -134,7 +134,7 @@ def _rejected(rejected: tuple[Rejection, ...]) -> Iterator[Caution]:
     if copies:
         yield Caution(
             "frames are bit for bit the same as others, and each counts once",
-            frames_in_words(copies),
+            frames_text(copies),
             "record every view anew: a copied frame adds no measurement",
         )
 
@@ -148,7 +148,7 @@ def _validation(found: CrossValidation | None) -> Iterator[Caution]:
         )
 
 
-def frames_in_words(frames: tuple[int, ...] | list[int]) -> str:
+def frames_text(frames: tuple[int, ...] | list[int]) -> str:
     """Frame numbers, runs of them as ranges."""
     runs: list[list[int]] = []
     for frame in sorted(frames):

@@ -17,8 +17,8 @@ _AS_FAR = 1.5
 pose that belongs to another picture is farther off by orders of magnitude."""
 
 
-def vindicated(model: CellModel, views: Views, taken: BoolArray, accused: BoolArray) -> BoolArray:
-    """(N,) which of the accused frames lie as near to their logged pose as others do.
+def cleared(model: CellModel, views: Views, taken: BoolArray, suspected: BoolArray) -> BoolArray:
+    """(N,) which of the suspected frames lie as near to their logged pose as others do.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def vindicated(model: CellModel, views: Views, taken: BoolArray, accused: BoolAr
         All N, with corners that do not count as NaN.
     """
     miss = _miss_px(model, views)
-    return np.asarray(accused & (miss <= _AS_FAR * np.nanmax(miss[taken])))
+    return np.asarray(suspected & (miss <= _AS_FAR * np.nanmax(miss[taken])))
 
 
 def _miss_px(model: CellModel, views: Views) -> FloatArray:

@@ -187,7 +187,7 @@ def _held(
     choice = choose_focus_law(
         d, alpha, alpha_sigma, per_distance_px_m=per_metre, common_distance_sigma_m=common_sigma_m
     )
-    choice = None if choice is None else _borne_out(choice, reference)
+    choice = None if choice is None else _confirmed(choice, reference)
     name = "constant" if choice is None else choice.preferred.law
     law = choice.preferred if choice is not None else _mean_law(d, alpha, alpha_sigma)
     if name == "constant":
@@ -204,7 +204,7 @@ def _held(
     return _Alpha(law, choice), beta_law
 
 
-def _borne_out(choice: FocusLawChoice, reference: RobotReference) -> FocusLawChoice:
+def _confirmed(choice: FocusLawChoice, reference: RobotReference) -> FocusLawChoice:
     """Ask the joint fit of pictures and robot where the scale factors alone are a poor witness.
 
     They inherit every error of the arm's distances. So a lens that the joint fit knows to stand

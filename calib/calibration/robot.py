@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.calibration.held_out_check import vindicated
+from calib.calibration.held_out_check import cleared
 from calib.calibration.joint_lens import with_deserved_terms
 from calib.calibration.picture_evidence import picture_evidence
 from calib.calibration.result import RobotReference
@@ -90,7 +90,7 @@ def fit_robot(
     plain = CellModel(_without_skew(optics), hand.flange_from_mounted, hand.base_from_fixed)
     try:
         law, joint, gain = _best_lens(plain, chosen, noise)
-        back = vindicated(joint.model, counted, taken, used & views.has_pose & ~taken)
+        back = cleared(joint.model, counted, taken, used & views.has_pose & ~taken)
         if back.any():
             joint = _fit(joint.model, counted.take(taken | back), joint.noise)
         joint = with_deserved_terms(joint, counted.take(taken | back))
@@ -166,13 +166,13 @@ def _best_lens(plain: CellModel, views: Views, noise: Noise) -> tuple[str | None
     for law in _FOCUS_LAWS:
         effect = make_effect("focus_breathing", {"law": law})
         moving = _fit(still.model.with_effects([effect]), views, still.noise)
-        if _aic(moving) < _aic(best[1]) and _borne_out(still, moving, views):
+        if _aic(moving) < _aic(best[1]) and _confirmed(still, moving, views):
             best = (law, moving)
     gain = _aic(still) - _aic(best[1])
     return (*best, gain) if gain >= DECISIVE_AIC else (None, still, gain)
 
 
-def _borne_out(still: JointFit, moving: JointFit, views: Views) -> bool:
+def _confirmed(still: JointFit, moving: JointFit, views: Views) -> bool:
     pictures = picture_evidence(still, moving, views)
     by_themselves = pictures.gain > THREE_SIGMAS
     return by_themselves or (_arm_is_true(moving) and pictures.deviation < THREE_SIGMAS)

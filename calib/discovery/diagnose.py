@@ -85,7 +85,7 @@ def diagnose(
         unseen_views = repaired.views.take(held)
         structure, dropped = drop_what_predicts_worse(structure, before, unseen_views)
     found = _diagnosis(repaired, held, before, structure)
-    found = replace(found, said=(*found.said, *map(str, dropped)))
+    found = replace(found, notes=(*found.notes, *map(str, dropped)))
     return _with_lost_frames(found, lost_frames(repaired.rejected, views.frame))
 
 
@@ -216,7 +216,7 @@ def _diagnosis(
         views=repaired.views,
         log=repaired.log,
         rejected=repaired.rejected,
-        said=(*repaired.said, *_pictures(twin, repaired.views), *_unseen(repaired.views)),
+        notes=(*repaired.notes, *_pictures(twin, repaired.views), *_unseen(repaired.views)),
     )
 
 

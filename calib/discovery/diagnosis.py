@@ -112,7 +112,7 @@ class Diagnosis(Shown):
         The plain cell and the cell with all that was found, each fitted to every usable frame.
     views, log:
         The mended frames that were used, and every mended row of the log.
-    rejected, said:
+    rejected, notes:
         Frames left out; what was worked out, filled in, or could not be seen.
     """
 
@@ -128,7 +128,7 @@ class Diagnosis(Shown):
     views: Views
     log: Views
     rejected: tuple[Rejection, ...]
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
 
     @property
     def unexplained(self) -> Unexplained | None:

@@ -50,7 +50,7 @@ class LogRepair:
         What was mended, in order.
     rejected:
         Frames left out, with reasons.
-    said:
+    notes:
         What was worked out rather than logged, and what could not be.
     has_robot:
         False where there are no poses to hold the pictures against.
@@ -65,7 +65,7 @@ class LogRepair:
     free: FreeViews
     mixups: tuple[Mixup, ...]
     rejected: tuple[Rejection, ...]
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
     has_robot: bool
     joints_logged: bool
     known: tuple[Present, ...]
@@ -95,7 +95,7 @@ class _Log:
     def __init__(self, views: Views, log: Views) -> None:
         self.views, self.log = views, log
         self.mixups: list[Mixup] = []
-        self.said: list[str] = []
+        self.notes: list[str] = []
         self.known: tuple[Present, ...] = ()
 
     def mend(self, mixup: Mixup | None) -> bool:
@@ -109,18 +109,18 @@ class _Log:
     def fill_in(self) -> None:
         """Name the arm and work out poses that were not logged."""
         self.mend(find_degrees(self.views))
-        self.views, arm_said = recognise_arm(self.views)
+        self.views, arm_note = recognise_arm(self.views)
         self.log = replace(self.log, robot_model=self.views.robot_model)
         recovered = recover_poses(self.views)
         self.views, self.log = recovered.views, recover_poses(self.log).views
-        self.said += [*recovered.said, *([] if arm_said is None else [arm_said])]
+        self.notes += [*recovered.notes, *([] if arm_note is None else [arm_note])]
 
     def fill_in_joints(self) -> bool:
         """Work out joints that were not logged; False where there were none."""
         logged = bool(np.isfinite(self.log.joints_rad).any())
         worked_out = recover_joints(self.log)
         self.log = worked_out.views
-        self.said += worked_out.said
+        self.notes += worked_out.notes
         self.views = _rows_of(self.views, self.log)
         return logged
 
@@ -134,7 +134,7 @@ def _repaired(repair: _Log, *, renumbered: bool) -> LogRepair:
     if not renumbered:
         repair.fill_in()
     if int((repair.views.has_pose & good).sum()) < FEWEST_FRAMES:
-        repair.said.append("no robot poses: what a free camera pose can absorb cannot be seen")
+        repair.notes.append("no robot poses: what a free camera pose can absorb cannot be seen")
         repair.views = _without_robot(repair.views, free)
         return _log_repair(repair, free, list(baseline.rejected), False, good, True)
     frozen = find_frozen_poses(repair.views, loop)
@@ -224,7 +224,7 @@ def _log_repair(
         kept_free,
         tuple(repair.mixups),
         tuple(rejected),
-        tuple(repair.said),
+        tuple(repair.notes),
         has_robot,
         joints_logged,
         repair.known,

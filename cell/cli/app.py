@@ -25,7 +25,7 @@ from cell.cli.run import run
 from cell.cli.simulate import simulate
 from cell.cli.streams import lost_output, make_patient
 from cell.cli.study import study
-from cell.cli.unforeseen import words_of
+from cell.cli.unforeseen import arguments_of
 from cell.cli.verify import verify
 from cell.compiled import prepare
 from cell.errors import EXIT_BAD_ANSWER, EXIT_DONE, EXIT_OPERATOR, exit_status_of
@@ -114,6 +114,6 @@ def _status(program: Callable[[], object]) -> int:
         return EXIT_OPERATOR
     except Exception as error:
         status = exit_status_of(error)
-        say_error(words_of(error) if status is None else str(error))
+        say_error(arguments_of(error) if status is None else str(error))
         return EXIT_BAD_ANSWER if status is None else status
     return EXIT_DONE

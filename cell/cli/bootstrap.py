@@ -76,7 +76,7 @@ def bootstrap(
         "frames": done.result.frames,
     }
     if done.found is None:
-        show(f"{done.result.finish.words}: nothing found", mapping, as_json=as_json)
+        show(f"{done.result.finish.text}: nothing found", mapping, as_json=as_json)
         say_error(done.result.reason + ("" if done.result.frames else _NO_BOARD))
         raise typer.Exit(done.result.finish.exit_status)
     views = task.write(done)

@@ -25,7 +25,7 @@ def calibrate(
     from cell.views.terminal.progress import counted_progress
     from cell.views.terminal.summary import (
         calibration_summary,
-        undetermined_words,
+        undetermined_text,
         warning_lines,
     )
 
@@ -38,6 +38,6 @@ def calibrate(
         say(line)
     text = f"{calibration_summary(calibrated.mapping)}\nreport: {folder / 'report.html'}"
     show(text, calibrated.mapping, as_json=as_json)
-    missing = undetermined_words(calibrated.mapping)
+    missing = undetermined_text(calibrated.mapping)
     if missing is not None:
         raise BadAnswer(f"{recording}: {missing}")

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from cell.cli.json_flag import JsonFlag
-from cell.cli.streams import check_output_whole
+from cell.cli.streams import check_output_written
 from cell.errors import InputError
 from cell.views.terminal.output import say, show
 
@@ -61,8 +61,8 @@ def export(
     as_json: JsonFlag = False,
 ) -> None:
     """Hand over the calibrated camera, or its place on the robot, in another tool's format."""
+    from cell.storage.atomic import write_atomically
     from cell.storage.files.calibration_place import calibration_file
-    from cell.storage.whole import write_whole
     from cell.verbs.export import export_calibration, read_calibration
 
     path = calibration_file(calibration)
@@ -90,10 +90,10 @@ def export(
     if exported.files:
         _write_folder(output, exported.files)
     elif output is not None:
-        write_whole(output, exported.text)
+        write_atomically(output, exported.text)
     if output is None and not as_json:
         sys.stdout.write(exported.text)
-        check_output_whole()
+        check_output_written()
         return
     written = None if output is None else str(output)
     result = {"format": tool, "file": written, "text": exported.text, "warnings": exported.warnings}
@@ -101,7 +101,7 @@ def export(
 
 
 def _write_folder(output: Path | None, files: Mapping[str, str]) -> None:
-    from cell.storage.whole import write_whole
+    from cell.storage.atomic import write_atomically
 
     if output is None:
         raise InputError("--views makes a folder of files: say which with -o FOLDER")
@@ -110,7 +110,7 @@ def _write_folder(output: Path | None, files: Mapping[str, str]) -> None:
     except OSError as fault:
         raise InputError(f"-o {output}: cannot be made: {fault.strerror}; give another") from None
     for name, text in files.items():
-        write_whole(output / name, text)
+        write_atomically(output / name, text)
 
 
 def _frame(words: str) -> tuple[str, str]:

@@ -82,7 +82,7 @@ def import_(
 ) -> None:
     """Turn images and poses of another tool's layout into a recording, corners found."""
     from cell.storage.files.board_words import parse_board
-    from cell.verbs.importing.conventions import Said
+    from cell.verbs.importing.conventions import StatedConvention
     from cell.verbs.importing.described import Described, OfBag
     from cell.verbs.importing.importer import import_source
     from cell.views.terminal.progress import counted_progress
@@ -91,7 +91,7 @@ def import_(
         board=None if board is None else parse_board(board).model_dump(),
         poses=poses,
         joints=joints,
-        said=Said(rotation, unit, inverted),
+        stated=StatedConvention(rotation, unit, inverted),
         mount=mount,
         robot=robot,
         time_bound_s=time_bound,

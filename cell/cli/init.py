@@ -107,11 +107,11 @@ def _asked(question: Question) -> str:
     """The answer from the terminal; where nobody sits there the usual one, with a word."""
     if not sys.stdin.isatty():
         if question.usual is None:
-            raise InputError(f"{question.option} is needed: {question.words}")
+            raise InputError(f"{question.option} is needed: {question.prompt}")
         say(f"{question.option} {question.usual} (not given)")
         return question.usual
     while True:
-        text = str(typer.prompt(question.words, default=question.usual, err=True))
+        text = str(typer.prompt(question.prompt, default=question.usual, err=True))
         try:
             question.read(text)
         except InputError as fault:

@@ -20,9 +20,9 @@ class WithPage(TyperCommand):
         return super().parse_args(ctx, list(with_addresses(args)))
 
 
-def with_addresses(words: list[str]) -> Iterator[str]:
+def with_addresses(arguments: list[str]) -> Iterator[str]:
     """The words with an address behind every `--page`: the one that follows, or the default."""
-    left = iter(words)
+    left = iter(arguments)
     for word in left:
         if word != NAME:
             yield word

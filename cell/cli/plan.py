@@ -51,15 +51,15 @@ def plan(
     """Design a plan: the views that make the calibration most certain, and the way between them."""
     from cell.verbs.plan import Requirements
 
-    wish = Requirements(frames, parallel, varied, alpha_sigma_px, seed, by_hand)
+    requirements = Requirements(frames, parallel, varied, alpha_sigma_px, seed, by_hand)
     if power:
-        _power(cell, output, wish, as_json=as_json)
+        _power(cell, output, requirements, as_json=as_json)
         return
     path = output or cell.with_name(cell.name.split(".")[0] + ".plan.yaml")
-    _print_plan(_written(cell, path, wish), as_json=as_json)
+    _print_plan(_written(cell, path, requirements), as_json=as_json)
 
 
-def _designed(cell: Path, path: Path, wish: Requirements) -> Plan:
+def _designed(cell: Path, path: Path, requirements: Requirements) -> Plan:
     from cell.storage.files.cell_file import read_cell
     from cell.storage.files.plan_file import Plan
     from cell.verbs.plan import design_plan
@@ -67,16 +67,16 @@ def _designed(cell: Path, path: Path, wish: Requirements) -> Plan:
     read = read_cell(cell)
     held = cell.resolve().is_relative_to(path.resolve().parent)  # a plan names no file elsewhere
     named = os.path.relpath(cell.resolve(), path.resolve().parent) if held else None
-    return Plan(path, design_plan(read, wish.size_for(read), named), read)
+    return Plan(path, design_plan(read, requirements.size_for(read), named), read)
 
 
-def _written(cell: Path, path: Path, wish: Requirements) -> Plan:
+def _written(cell: Path, path: Path, requirements: Requirements) -> Plan:
     """Design a plan and write it."""
     from cell.storage.files.writing import check_new, write_new, yaml_text
 
     check_new(path)
-    plan = _designed(cell, path, wish)
-    comment = f"Made by `cell plan {' '.join([cell.name, *wish.as_words()])}`."
+    plan = _designed(cell, path, requirements)
+    comment = f"Made by `cell plan {' '.join([cell.name, *requirements.as_options()])}`."
     write_new(path, yaml_text(plan.file.as_mapping(), comment=comment))
     return plan
 
@@ -106,7 +106,7 @@ def _print_plan(plan: Plan, *, as_json: bool) -> None:
     show("\n".join(lines), result, as_json=as_json)
 
 
-def _power(given: Path, output: Path | None, wish: Requirements, *, as_json: bool) -> None:
+def _power(given: Path, output: Path | None, requirements: Requirements, *, as_json: bool) -> None:
     from rich.console import Console
 
     from cell.verbs.plan.power import as_mapping, as_text, is_plan, power_of, power_of_file
@@ -114,9 +114,9 @@ def _power(given: Path, output: Path | None, wish: Requirements, *, as_json: boo
     if is_plan(given):
         found = power_of_file(given)
     elif output is None:
-        found = power_of(_designed(given, given, wish))
+        found = power_of(_designed(given, given, requirements))
     else:
-        found = power_of(_written(given, output, wish))
+        found = power_of(_written(given, output, requirements))
     if as_json:
         show("", as_mapping(found), as_json=True)
     else:

@@ -89,7 +89,7 @@ def lost_output() -> str:
     return fault.strerror or str(fault)
 
 
-def check_output_whole() -> None:
+def check_output_written() -> None:
     """Raise `InputError` where a result that stands nowhere else was not printed."""
     reason = lost_output()
     if reason:

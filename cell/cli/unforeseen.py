@@ -10,7 +10,7 @@ import traceback
 from importlib.metadata import version
 
 
-def words_of(error: BaseException) -> str:
+def arguments_of(error: BaseException) -> str:
     """What the operator is told of an error in the program itself; its trace goes into a file."""
     if isinstance(error, MemoryError):
         return "the memory of this computer is used up; use fewer or smaller pictures"

@@ -106,7 +106,7 @@ def _run(source: Path, calibration: Path, dry_run: bool, views: int, folder: Pat
     for view, reason in result.skipped.items():
         say(f"skipped view {view}: {reason}")
     if not Outcome.of(result, folder).complete:
-        say_error(result.reason or result.finish.words)
+        say_error(result.reason or result.finish.text)
         raise typer.Exit(result.finish.exit_status)
 
 

@@ -18,7 +18,7 @@ from cell.sequencer.guard import Guard
 from cell.storage.files.camera_file import Lens
 from cell.storage.files.cell_file import CellFile, EffectFile, Simulation
 from cell.storage.files.plan_file import Plan
-from cell.storage.recording.further import further_numbers, further_words
+from cell.storage.recording.additional_columns import additional_labels, additional_numbers
 from sim.arm import Repeatability
 from sim.cell import CameraSpec, SimulatedCell
 from sim.log import tour
@@ -204,7 +204,7 @@ def _with_logged(plan: Plan, log: Views) -> Views:
     return replace(
         log,
         moving=moving,
-        extra=further_numbers(further),
-        labels=further_words(further),
+        extra=additional_numbers(further),
+        labels=additional_labels(further),
         **columns,
     )

@@ -14,7 +14,7 @@ def check_bounded(cell: CellFile) -> None:
             "`workspace`, the box that the arm stays inside; or, where there is truly nothing to"
             " run into, neither floor nor table, write why: `no_workspace_because: ...`"
         )
-    if not cell.says_keep_out:
+    if not cell.states_keep_out:
         missing.append(
             "`keep_out`, the boxes that it stays out of; `keep_out: []` where there are none"
         )

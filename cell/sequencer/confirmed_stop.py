@@ -21,7 +21,7 @@ _POLL_S = 0.008
 
 
 @dataclass(frozen=True)
-class StopWord:
+class StopReport:
     """What is known after a stop.
 
     Attributes
@@ -60,7 +60,7 @@ class ConfirmedStop:
 
     def see_through(
         self, before: ArmState | None = None, *, least_way_rad: float = -1.0
-    ) -> StopWord:
+    ) -> StopReport:
         """Order the stop, again and again, until readings prove it or `DEADLINE_S` has passed.
 
         Parameters
@@ -81,9 +81,9 @@ class ConfirmedStop:
             after_s = self._clock.now() - began_s
             if stands:
                 text = f"the arm stands: readings confirm it {after_s:.2f} s after the order"
-                return StopWord(True, after_s, orders, text)
+                return StopReport(True, after_s, orders, text)
             if after_s > DEADLINE_S:
-                return StopWord(False, after_s, orders, _alarm(evidence, refusal, orders))
+                return StopReport(False, after_s, orders, _alarm(evidence, refusal, orders))
             self._clock.sleep(_POLL_S)
 
     def _order(self) -> str:

@@ -93,18 +93,20 @@ _REMEDY = (
 )
 
 
-def model_differs(named: str, controller_says: object) -> str:
+def model_differs(named: str, controller_model: object) -> str:
     """Both names, where the controller calls its arm by another size; empty where they agree.
 
     Controllers of Universal Robots leave the e-Series' letter away, so sizes are compared only.
     """
-    if not (isinstance(controller_says, str) and named.startswith("ur")):
+    if not (isinstance(controller_model, str) and named.startswith("ur")):
         return ""
-    size = re.search(r"ur\s*(\d+)", controller_says.lower())
+    size = re.search(r"ur\s*(\d+)", controller_model.lower())
     known = _NAMES_OF.get(named, set(re.findall(r"\d+", named)))
     if size is None or size[1] in known:
         return ""
-    return f"the cell file says robot.model {named}, the controller calls its arm {controller_says}"
+    return (
+        f"the cell file says robot.model {named}, the controller calls its arm {controller_model}"
+    )
 
 
 def _place(pose: RigidTransform) -> str:

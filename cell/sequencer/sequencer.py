@@ -39,7 +39,7 @@ from cell.storage.files.plan_file import Plan
 from cell.storage.recording import FrameRecord, RecordingWriter
 from drivers.arm import Arm, ArmState
 from drivers.camera import Camera, FocusSetting, Frame
-from drivers.errors import FrameLost
+from drivers.errors import FrameMissing
 
 _LAST_FRAME_S = 30.0
 
@@ -292,7 +292,7 @@ class Sequencer:
                 frame, states = self._grab(exposure.timeout_s)
                 shot = Shot(index, frame, states, tuple(came_from.tolist()))
                 fault = shot.pose_fault(self._plan.file.checks)
-            except FrameLost as lost:
+            except FrameMissing as lost:
                 fault = str(lost)
             except CameraLost as lost:
                 if reopened:

@@ -75,7 +75,7 @@ def record_plan(
         try:
             result = sequencer.run()
             if result.finish is not Finish.DEVICE_FAILED:
-                writer.check_whole()
+                writer.check_complete()
             writer.say(ended_early=result.ended_early or None)
             return result
         finally:
@@ -134,10 +134,10 @@ def _elapsed_s(
 
 def recorded_robot(robot: SimulatedRobot) -> dict[str, Any]:
     """The arm of a cell file in the words of `recording.yaml`."""
-    said: dict[str, Any] = {"model": robot.model, "payload_kg": robot.payload_kg}
+    settings: dict[str, Any] = {"model": robot.model, "payload_kg": robot.payload_kg}
     if robot.urdf is not None:
-        said |= {"urdf": robot.urdf, "base": robot.base, "flange": robot.flange}
-    return said
+        settings |= {"urdf": robot.urdf, "base": robot.base, "flange": robot.flange}
+    return settings
 
 
 def header_of(plan: Plan, *, simulated: bool, images: bool = True) -> Header:

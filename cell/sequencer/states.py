@@ -58,8 +58,8 @@ class Finish(Enum):
     SAFETY = ("a safety limit", EXIT_SAFETY)
     UNFORESEEN = ("an unforeseen error", EXIT_BAD_ANSWER)
 
-    def __init__(self, words: str, exit_status: int) -> None:
-        self.words = words
+    def __init__(self, text: str, exit_status: int) -> None:
+        self.text = text
         self.exit_status = exit_status
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from calib.views import FloatArray
 from cell.errors import StoppedByOperator
 from cell.sequencer.clock import Clock
-from cell.sequencer.confirmed_stop import ConfirmedStop, StopWord
+from cell.sequencer.confirmed_stop import ConfirmedStop, StopReport
 from cell.sequencer.guard import Guard
 from cell.sequencer.reading_watch import ARRIVING_RAD, ReadingWatch
 from cell.sequencer.rest import fastest_rad_s
@@ -197,7 +197,7 @@ class WatchedArm:
                 )
             self.clock.sleep(POLL_S)
 
-    def halt(self, *, undisturbed: bool = False) -> StopWord:
+    def halt(self, *, undisturbed: bool = False) -> StopReport:
         """Stop the arm; returns what readings say of it afterwards.
 
         `undisturbed`: nothing can have stopped it before.
@@ -208,7 +208,7 @@ class WatchedArm:
         self._goal_rad = None
         return word
 
-    def stop(self, fault: BaseException | None) -> tuple[BaseException | None, StopWord | None]:
+    def stop(self, fault: BaseException | None) -> tuple[BaseException | None, StopReport | None]:
         """Stop the arm before all else, at a fault or at the end of a run.
 
         Returns

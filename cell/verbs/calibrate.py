@@ -14,7 +14,7 @@ from calib.errors import CalibrationError
 from calib.views import Views
 from cell.errors import BadAnswer
 from cell.storage.files.calibration_file import CalibrationFile
-from cell.storage.files.made_by import made_by
+from cell.storage.files.provenance import made_by
 from cell.storage.files.results import results_folder, write_results
 from cell.storage.recording import Corners, Recording, write_corners
 from cell.storage.recording.detect import Progress, corners_of

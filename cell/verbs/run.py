@@ -31,7 +31,7 @@ from cell.views.terminal.summary import (
     answer_line,
     calibration_summary,
     diagnosis_summary,
-    undetermined_words,
+    undetermined_text,
     warning_lines,
 )
 
@@ -174,7 +174,7 @@ class Outcome:
             "skipped": [{"view": view, "reason": why} for view, why in result.skipped.items()],
         }
         lost = f", {len(result.skipped)} views skipped" if result.skipped else ""
-        text = f"{result.finish.words}: {result.frames} frames{lost} in {folder}"
+        text = f"{result.finish.text}: {result.frames} frames{lost} in {folder}"
         if result.ended_early:
             text = f"{text}\nended early: {result.ended_early}"
         complete = result.finish in (Finish.COMPLETED, Finish.COMPLETED_WITH_LOSSES)
@@ -209,7 +209,7 @@ def evaluate(
         report_progress(line)
     calibrates = replace(
         outcome,
-        undetermined=undetermined_words(calibrated.mapping),
+        undetermined=undetermined_text(calibrated.mapping),
         text=f"{outcome.text}\n{calibration_summary(calibrated.mapping)}",
         mapping=outcome.mapping
         | _files(folder, "calibration.json", "report.html")

@@ -73,7 +73,7 @@ def simulate_pictures(plan: Plan, folder: Path, seed: int | None = None) -> int:
     """
     result = record_plan(plan, folder, simulated_devices(plan, seed=seed), simulated=True)
     if result.reason:
-        raise BadAnswer(f"{folder}: {result.finish.words}: {result.reason}")
+        raise BadAnswer(f"{folder}: {result.finish.text}: {result.reason}")
     return result.frames
 
 

@@ -114,6 +114,6 @@ def _refusal(url: str, error: Exception) -> DeviceError:
     if code == -1 or "401" in str(error):
         return DeviceRefused(f"ABB arm {url}: user name or password is wrong")
     if code is not None:
-        said = printable(str(error))
-        return DeviceRefused(f"ABB arm {url}: the controller refuses: {said} (code {code})")
+        text = printable(str(error))
+        return DeviceRefused(f"ABB arm {url}: the controller refuses: {text} (code {code})")
     return DeviceError(f"ABB arm {url}: {printable(str(error)) or type(error).__name__}")

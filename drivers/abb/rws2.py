@@ -203,9 +203,9 @@ class Rws2:
         reported = {} if answer.status_code == _NO_CONTENT or not answer.content else _json(answer)
         if answer.status_code >= _REFUSED:
             status = reported.get("status")
-            said = status if isinstance(status, dict) else {}
-            code = -1 if answer.status_code == 401 else int(said.get("code", answer.status_code))
-            raise Rws2Refused(str(said.get("msg", f"HTTP status {answer.status_code}")), code)
+            fields = status if isinstance(status, dict) else {}
+            code = -1 if answer.status_code == 401 else int(fields.get("code", answer.status_code))
+            raise Rws2Refused(str(fields.get("msg", f"HTTP status {answer.status_code}")), code)
         return reported
 
 

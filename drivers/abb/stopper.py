@@ -106,9 +106,9 @@ class Stopper:
         assert guard.stdout is not None
         late = threading.Timer(_GUARD_START_S, guard.kill)
         late.start()
-        said = guard.stdout.readline()
+        greeting = guard.stdout.readline()
         late.cancel()
-        if said.strip() != "ready":
+        if greeting.strip() != "ready":
             self._end_guard(guard)
             raise DeviceUnreachable(
                 f"ABB arm {self._url}: the process that is to stop the arm should this one die "

@@ -119,7 +119,7 @@ class Supervisor:
     def stop(self) -> str | None:
         """Stop the arm; return why the stop was not taken, or None."""
         self._cancelled.set()
-        answered = self._stopper.order(motors_off=self._unheeded())
+        answered = self._stopper.order(motors_off=self._ignored_orders())
         with self._lock:
             self._order = None
             # one that is repeated is as old as its first order
@@ -129,7 +129,7 @@ class Supervisor:
             return "the controller is silent"
         return self._stopper.failure
 
-    def _unheeded(self) -> bool:
+    def _ignored_orders(self) -> bool:
         """Whether a stop that was ordered some time ago has not been seen obeyed."""
         since_s = self._stop_s
         return since_s is not None and time.monotonic() - since_s > _MOTORS_OFF_S
@@ -196,7 +196,7 @@ class Supervisor:
         self._polls += 1
         in_turn = self._polls % _PANEL_EVERY == 0
         with named(self._url):
-            self._vouch()
+            self._confirm_guard()
             if in_turn or not self._still:
                 self._running = self._rws.get_execution_state().ctrlexecstate == "running"
             self._still = self._still and not self._running
@@ -207,7 +207,7 @@ class Supervisor:
         if panel is not None:
             self._trip(panel)
 
-    def _vouch(self) -> None:
+    def _confirm_guard(self) -> None:
         if self._order is None and self._still:
             self._watch.end()
         elif self._stop_s is None:
@@ -225,7 +225,7 @@ class Supervisor:
             stop_again = self._stop_pending()
             off = self._end_order()
         if stop_again:
-            self._stopper.order(motors_off=self._unheeded())
+            self._stopper.order(motors_off=self._ignored_orders())
         if off is not None:
             self._trip(self._reason(off))
 

@@ -124,8 +124,10 @@ class RobotApi:
                 f"UR controller {self._host}: refuses '{action}' in local mode: switch to Remote "
                 "on the safety screen of the teach pendant (in automatic mode)"
             )
-        said = " ".join(str(reported[key]) for key in ("message", "details") if reported.get(key))
-        return printable(said) or f"HTTP status {status}"
+        details = " ".join(
+            str(reported[key]) for key in ("message", "details") if reported.get(key)
+        )
+        return printable(details) or f"HTTP status {status}"
 
     def _ask(self, verb: str, path: str, body: str | None = None) -> tuple[int, dict[str, Any]]:
         with self._lock:

@@ -101,12 +101,12 @@ class Supervisor:
 
     def stop(self) -> list[str]:
         """Stop the arm; return the names of the paths that took the order."""
-        ways = self._stops.order(power_off=self._unheeded())
+        ways = self._stops.order(power_off=self._ignored_orders())
         with self._lock:
             self._cancel()
         return ways
 
-    def _unheeded(self) -> bool:
+    def _ignored_orders(self) -> bool:
         """Whether a stop that was ordered some time ago has not been seen obeyed."""
         since_s = self._stop_s
         return since_s is not None and time.monotonic() - since_s > _POWER_OFF_S
@@ -129,7 +129,7 @@ class Supervisor:
         if self._thread is not threading.current_thread():
             self._thread.join(timeout=2.0)
         self.stop()
-        self._bury()
+        self._reap()
         self._remote.close()
         self._stops.close()
 
@@ -145,7 +145,7 @@ class Supervisor:
             self._killed.append(self._child)
             self._child = None
 
-    def _bury(self) -> None:
+    def _reap(self) -> None:
         """Wait for killed children, then stop again: what they had sent may have come in late."""
         while self._killed:
             self._killed.pop().reap()
@@ -154,13 +154,13 @@ class Supervisor:
     def _run(self) -> None:
         while not self._closing.wait(_CYCLE_S):
             try:
-                self._bury()
+                self._reap()
                 packet = self._reader.newest()
                 with self._lock:
                     self._watch(packet)
             except DeviceUnreachable as error:
                 self._trip(str(error))
-                self._bury()
+                self._reap()
                 self._repeat_stop()
                 # whether the arm stands is told by a reading or not at all
                 self._reader.reopen()
@@ -205,7 +205,7 @@ class Supervisor:
         now = time.monotonic()
         pending = self._stop_s is not None and now - self._stop_s < _REPEAT_S
         if pending and now - self._resent_s > _RESEND_S:
-            self._stops.order(power_off=self._unheeded())
+            self._stops.order(power_off=self._ignored_orders())
             self._resent_s = now
 
     def _drive(self, packet: Packet) -> None:

@@ -42,7 +42,7 @@ def test_a_wrong_layout_is_found_without_leaving_the_neighbourhood(
     assert off_m < 2e-3
     assert off_rad < np.radians(0.2)
     assert off_m < 5 * np.linalg.norm(trial.found.mounted_sigma_m)
-    whole, views = trial.planned_views_whole()
+    whole, views = trial.planned_views_seen_whole()
     assert whole == views > 30
     folder = tmp_path / "trial"
     frames = read_recording(folder / "run").frames

@@ -68,5 +68,5 @@ def test_joints_that_are_off_and_a_soft_bracket_cost_millimetres_and_no_view() -
     assert trial.error is None
     assert trial.violations() == []
     assert trial.mounted_error()[0] < 0.01
-    whole, views = trial.planned_views_whole()
+    whole, views = trial.planned_views_seen_whole()
     assert whole == views > 20

@@ -32,7 +32,7 @@ def test_three_shifts_take_the_place_of_a_layout(tmp_path: Path) -> None:
     off_m, off_rad = trial.mounted_error()
     assert off_m < 2e-3
     assert off_rad < np.radians(0.2)
-    whole, views = trial.planned_views_whole()
+    whole, views = trial.planned_views_seen_whole()
     assert whole == views > 20
     assert trial.found is not None
     assert trial.found.layout.home_deg == pytest.approx(start_deg, abs=1e-3)

@@ -27,9 +27,9 @@ from cell.storage.files.plan_file import PlanFile, read_plan
 from cell.storage.files.writing import yaml_text
 from cell.storage.recording import FrameRecord, read_recording
 from cell.verbs.bootstrap import Bootstrap, LayoutUncertainty
-from cell.verbs.bootstrap.found import Found
 from cell.verbs.bootstrap.guide import BootstrapGuide
 from cell.verbs.bootstrap.near_guard import FARTHEST_M, FARTHEST_RAD, TRAVEL_RAD, NearGuard
+from cell.verbs.bootstrap.result_file import Found
 from cell.verbs.plan import design_plan
 from drivers.arm import ArmState, Motion
 from drivers.camera import Frame
@@ -168,7 +168,7 @@ class Trial:
         angle = Rotation.from_matrix(off[:3, :3]).magnitude()
         return float(np.linalg.norm(off[:3, 3])), float(angle)
 
-    def planned_views_whole(self) -> tuple[int, int]:
+    def planned_views_seen_whole(self) -> tuple[int, int]:
         """How many of the plan's views show the whole board in truth, and how many there are."""
         assert self.planned_rad is not None
         return int(whole(self.cell, self.planned_rad).sum()), len(self.planned_rad)

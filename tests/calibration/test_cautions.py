@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from calib.calibration import Calibration, calibrate
-from calib.calibration.cautions import cautions, frames_in_words
+from calib.calibration.cautions import cautions, frames_text
 from calib.chain.projection import project
 from calib.chain.rigid import inverse
 from calib.errors import CalibrationError
@@ -35,14 +35,14 @@ def undetermined(found: Calibration) -> set[str]:
     return {part for caution in found.cautions for part in caution.undetermined}
 
 
-def said(found: Calibration) -> str:
+def output(found: Calibration) -> str:
     return " ".join(f"{c.what} ({c.where}): {c.remedy}" for c in found.cautions)
 
 
 def test_a_sound_recording_determines_everything() -> None:
     found = calibrate(VIEWS)
     assert not undetermined(found)
-    assert "not determined" not in said(found)
+    assert "not determined" not in output(found)
 
 
 def one_orientation() -> Views:
@@ -96,8 +96,8 @@ def test_another_unit_of_length_is_named(scale: float, words: str) -> None:
     poses[:, :3, 3] *= scale
     found = calibrate(with_poses(poses))
     assert undetermined(found) == {"hand_eye"}
-    assert words in said(found)
-    assert "miss by" not in said(found)
+    assert words in output(found)
+    assert "miss by" not in output(found)
 
 
 def test_mirrored_pictures_are_named_by_the_sign_of_the_length() -> None:
@@ -105,7 +105,7 @@ def test_mirrored_pictures_are_named_by_the_sign_of_the_length() -> None:
     corners[..., 0] = VIEWS.width_px - 1 - corners[..., 0]
     found = calibrate(replace(VIEWS, corners_px=corners.reshape(VIEWS.corners_px.shape)))
     assert undetermined(found) == {"hand_eye"}
-    assert "the pictures are mirrored" in said(found)
+    assert "the pictures are mirrored" in output(found)
 
 
 def test_a_tool_frame_set_midway_is_no_matter_of_units() -> None:
@@ -115,8 +115,8 @@ def test_a_tool_frame_set_midway_is_no_matter_of_units() -> None:
     poses[6:] = poses[6:] @ tool
     found = calibrate(with_poses(poses))
     assert undetermined(found) == {"hand_eye"}
-    assert "by a factor of" not in said(found)
-    assert "which picture each is of" in said(found)
+    assert "by a factor of" not in output(found)
+    assert "which picture each is of" in output(found)
 
 
 def mixups_said(views: Views, found: Calibration) -> str:
@@ -148,13 +148,13 @@ def test_identical_frames_count_once() -> None:
     assert found.used.sum() == len(VIEWS)
     one, other = (c.solutions["joint_ml"].sigma["alpha_px"] for c in (found, alone))
     assert one == pytest.approx(other, rel=1e-6)
-    assert "each counts once" in said(found)
-    assert "frames 1-2, 4-5" in said(found)
+    assert "each counts once" in output(found)
+    assert "frames 1-2, 4-5" in output(found)
 
 
 def test_frames_as_runs() -> None:
-    assert frames_in_words([7]) == "frame 7"
-    assert frames_in_words([9, 1, 2, 3]) == "frames 1-3, 9"
+    assert frames_text([7]) == "frame 7"
+    assert frames_text([9, 1, 2, 3]) == "frames 1-3, 9"
 
 
 def test_the_verb_says_it_exits_1_and_export_refuses(

@@ -37,8 +37,8 @@ def _with_a_lens_that_moves_more(plan: Plan) -> Plan:
 def test_frames_that_only_the_wrong_lens_accuses_are_taken_back(views: Views) -> None:
     baseline = fit_baseline(views, usable_frames(views))
     hand = hand_eye_of(views, baseline.used, baseline.mle.camera_from_board)
-    accused = views.frame[~hand.used].tolist()
-    assert {15, 28} <= set(accused), "hand-eye alone accuses nobody here any more"
+    suspected = views.frame[~hand.used].tolist()
+    assert {15, 28} <= set(suspected), "hand-eye alone accuses nobody here any more"
     found = calibrate(views)
     assert found.robot is not None
     assert found.robot.outliers == ()

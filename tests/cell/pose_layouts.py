@@ -27,7 +27,7 @@ class Layout:
         Writes (N, 4, 4) base_from_flange into a folder; what `--poses` is given.
     picture:
         Name of picture `n` (from 0) out of the format's `n` and `t_ns`.
-    said:
+    stated:
         Options in the words of the command line.
     digits_mm:
         How finely the layout writes a position.
@@ -35,7 +35,7 @@ class Layout:
 
     write: Write
     picture: str = "img_{n:02d}.png"
-    said: dict[str, Any] = field(default_factory=dict)
+    stated: dict[str, Any] = field(default_factory=dict)
     digits_mm: float = 1e-3
 
 
@@ -399,7 +399,7 @@ LAYOUTS: dict[str, Layout] = {
     "UR, rotation vector": Layout(file("p.txt", lambda F: table(
         position(F), turn(F).as_rotvec()))),
     "UR, rotation said": Layout(file("p.txt", lambda F: table(
-        position(F), turn(F).as_rotvec())), said={"rotation": "rotvec"}),
+        position(F), turn(F).as_rotvec())), stated={"rotation": "rotvec"}),
     "rotation vector in degrees": Layout(file("p.csv", lambda F: table(
         1e3 * position(F), turn(F).as_rotvec(degrees=True), separator=";"))),
     "Fanuc, mm and w p r": Layout(file("p.csv", lambda F: _named(

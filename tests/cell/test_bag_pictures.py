@@ -70,10 +70,10 @@ def test_a_bayer_mosaic_gets_its_colours(pattern: str, deep: type) -> None:
     assert packed.dtype == deep
 
 
-def _compressed(pixels: np.ndarray, said: str, suffix: str = ".png") -> np.ndarray:
+def _compressed(pixels: np.ndarray, result: str, suffix: str = ".png") -> np.ndarray:
     data = cv2.imencode(suffix, pixels)[1].ravel()
     kind = T["sensor_msgs/msg/CompressedImage"]
-    return np.asarray(picture(kind(header=header(0.0), format=said, data=data), "here"))
+    return np.asarray(picture(kind(header=header(0.0), format=result, data=data), "here"))
 
 
 def test_a_compressed_picture_keeps_sixteen_bits() -> None:

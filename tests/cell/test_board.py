@@ -94,9 +94,9 @@ def test_a_board_has_its_white_edge_and_its_paper(tmp_path: Path) -> None:
 
 
 def test_the_verb_says_what_goes_into_the_cell_file(cell: Cell, tmp_path: Path) -> None:
-    said = cell("board", "7x10x0.025", "-o", tmp_path / "b.pdf")
-    assert said.status == 0, said.err
-    assert "board: {type: chessboard, rows: 7, cols: 10, square_m: 0.025}" in said.out
-    assert "11 squares along a row 275.0 mm, 8 along a column 200.0 mm" in said.out
+    result = cell("board", "7x10x0.025", "-o", tmp_path / "b.pdf")
+    assert result.status == 0, result.err
+    assert "board: {type: chessboard, rows: 7, cols: 10, square_m: 0.025}" in result.out
+    assert "11 squares along a row 275.0 mm, 8 along a column 200.0 mm" in result.out
     assert cell("board", "7x10", "-o", tmp_path / "b.pdf").status == 2
     assert cell("board", "7x10x0.025", "-o", tmp_path / "no" / "b.pdf").status == 2

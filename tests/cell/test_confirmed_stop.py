@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cell.sequencer.confirmed_stop import DEADLINE_S, ConfirmedStop, StopWord
+from cell.sequencer.confirmed_stop import DEADLINE_S, ConfirmedStop, StopReport
 from cell.sequencer.rest import REST_S
 from drivers.arm import ArmState, MoveTarget
 from drivers.errors import DeviceUnreachable, StopFailed
@@ -46,7 +46,7 @@ def moving(clock: FastClock) -> Reading:
     return arm
 
 
-def stopped(arm: Reading, clock: FastClock) -> StopWord:
+def stopped(arm: Reading, clock: FastClock) -> StopReport:
     before = arm.state()
     return ConfirmedStop(arm, clock).see_through(before, least_way_rad=0.0)
 

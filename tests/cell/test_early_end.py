@@ -253,12 +253,12 @@ def test_a_run_gone_on_with_is_judged_by_the_pictures_of_before(tmp_path: Path) 
     assert stopped.finish is Finish.STOPPED_BY_OPERATOR
     strided_plan(tmp_path, "until: {alpha_sigma_px: 2.0}")
     words = ["run", str(path), "--dry-run", "--record-only", "--json", "--resume"]
-    said = CliRunner().invoke(app, [*words, "-o", str(tmp_path / "run")])
-    assert said.exit_code == 0, said.output
-    status_changed = json.loads(said.stdout)
-    assert (status_changed["finish"], status_changed["frames"]) == ("completed", stopped.frames)
-    assert status_changed["ended_early"].startswith("alpha is known to 0.")
-    assert "ending early: alpha is known" in said.stderr
+    result = CliRunner().invoke(app, [*words, "-o", str(tmp_path / "run")])
+    assert result.exit_code == 0, result.output
+    shown = json.loads(result.stdout)
+    assert (shown["finish"], shown["frames"]) == ("completed", stopped.frames)
+    assert shown["ended_early"].startswith("alpha is known to 0.")
+    assert "ending early: alpha is known" in result.stderr
 
 
 def test_an_estimate_that_dies_leaves_the_run_alone(

@@ -329,13 +329,13 @@ def test_an_error_that_nobody_foresaw_is_one_line_and_a_file(tmp_path: Path) -> 
         "doctor", before=broken, capture_output=True, env={**os.environ, "TMPDIR": str(tmp_path)}
     )
     assert done.returncode == 1
-    said = done.stderr.decode()
-    assert "Traceback" not in said
-    assert "an error in this program: ZeroDivisionError: deep inside" in said
+    result = done.stderr.decode()
+    assert "Traceback" not in result
+    assert "an error in this program: ZeroDivisionError: deep inside" in result
     (kept,) = tmp_path.glob("cell-error-*.log")
-    assert str(kept) in said
+    assert str(kept) in result
     assert "Traceback" in kept.read_text()
-    assert len(said.splitlines()) == 1
+    assert len(result.splitlines()) == 1
 
 
 def test_an_arm_that_nobody_knows(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from calib.views import FloatArray
 from cell.errors import BadAnswer, InputError
 from cell.storage.recording import read_recording
 from cell.verbs.importing import RotationName
-from cell.verbs.importing.conventions import Candidate, Convention, Said
+from cell.verbs.importing.conventions import Candidate, Convention, StatedConvention
 from cell.verbs.importing.conventions import conclude as conclude_all
 from cell.verbs.importing.importer import Described, import_source
 from cell.verbs.importing.pairing import Pairing
@@ -39,7 +39,7 @@ WRITTEN: dict[RotationName, FloatArray] = {
 def conclude(poses: list[RawPose], rotation: RotationName | None = None) -> Convention:
     """How poses are understood without pictures to ask."""
     in_order = Pairing("one by one in their order", tuple(range(len(poses))))
-    return conclude_all([Candidate(poses, in_order)], Said(rotation))[1]
+    return conclude_all([Candidate(poses, in_order)], StatedConvention(rotation))[1]
 
 
 def words(values: FloatArray) -> str:
@@ -143,8 +143,10 @@ def test_pictures_and_poses_become_a_recording(tmp_path: Path) -> None:
     source = pictures(tmp_path / "source")
     poses = tmp_path / "poses.csv"
     poses.write_text(f"img_6.png,{COMMAS}\n")
-    said = Described(board=BOARD, poses=poses, said=Said(inverted=True), robot="ur5e")
-    imported = import_source(source, tmp_path / "r", said)
+    stated = Described(
+        board=BOARD, poses=poses, stated=StatedConvention(inverted=True), robot="ur5e"
+    )
+    imported = import_source(source, tmp_path / "r", stated)
     assert (imported.frames, imported.with_corners) == (2, 2)
     views = read_recording(tmp_path / "r").views()
     assert views.has_pose.tolist() == [False, True]
@@ -181,21 +183,21 @@ def test_joint_angles_become_poses_by_the_arms_kinematics(tmp_path: Path) -> Non
         "joint_values": angles[:, [2, 1, 0, 3, 4, 5]].tolist(),
     }
     (tmp_path / "joints.yaml").write_text(json.dumps(reported))
-    said = Described(board=BOARD, joints=tmp_path / "joints.yaml", robot="ur3")
-    import_source(source, tmp_path / "r", said)
+    stated = Described(board=BOARD, joints=tmp_path / "joints.yaml", robot="ur3")
+    import_source(source, tmp_path / "r", stated)
     views = read_recording(tmp_path / "r").views()
     np.testing.assert_allclose(views.base_from_flange, arm("ur3").forward(angles), atol=1e-9)
     np.testing.assert_allclose(views.joints_rad, angles, atol=1e-12)
     with pytest.raises(InputError, match="Say --robot MODEL"):
-        import_source(source, tmp_path / "s", Described(board=BOARD, poses=said.joints))
+        import_source(source, tmp_path / "s", Described(board=BOARD, poses=stated.joints))
 
 
 def test_pictures_and_poses_that_do_not_match(tmp_path: Path) -> None:
     source = pictures(tmp_path / "source", 3)
     (tmp_path / "p.txt").write_text(2 * (words(MATRIX.ravel()) + "\n"))
-    said = Described(board=BOARD, poses=tmp_path / "p.txt")
+    stated = Described(board=BOARD, poses=tmp_path / "p.txt")
     with pytest.raises(InputError, match="3 pictures and 2 poses"):
-        import_source(source, tmp_path / "r", said)
+        import_source(source, tmp_path / "r", stated)
 
 
 def test_what_is_missing_is_said(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def _poses(recording: Recording) -> FloatArray:
 
 
 def _says(result: dict[str, Any], words: str) -> str:
-    return next(said for said in result["guessed"] if words in said)
+    return next(result for result in result["guessed"] if words in result)
 
 
 def test_from_a_bag_to_the_hand_eye(tour: Tour, pictures: list[Message], tmp_path: Path) -> None:

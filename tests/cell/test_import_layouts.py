@@ -16,11 +16,11 @@ from calib.views import FloatArray, Mount
 from cell.errors import InputError
 from cell.verbs.importing import RotationName
 from cell.verbs.importing.conventions import (
-    NOTHING_SAID,
+    NOTHING_STATED,
     Candidate,
     Convention,
     PictureCheck,
-    Said,
+    StatedConvention,
     conclude,
 )
 from cell.verbs.importing.pairing import apply, pairings
@@ -51,7 +51,7 @@ XYZW = TURNS.as_quat()
 def read(
     path: Path,
     pictures: Sequence[str],
-    said: Said = NOTHING_SAID,
+    stated: StatedConvention = NOTHING_STATED,
     check: PictureCheck | None = None,
     square_m: float = SQUARE_M,
 ) -> tuple[FloatArray, Convention]:
@@ -61,7 +61,7 @@ def read(
         for series in flange_series(path, read_series(path))
         for pairing in pairings(pictures, series.poses)
     ]
-    chosen, convention = conclude(candidates, said, check, square_m)
+    chosen, convention = conclude(candidates, stated, check, square_m)
     poses = np.array([convention.transform(pose).as_matrix() for pose in chosen.poses])
     return apply(chosen.pairing, poses), convention
 
@@ -70,8 +70,8 @@ def read(
 def test_a_layout_is_understood_and_said_aloud(tmp_path: Path, name: str) -> None:
     layout = LAYOUTS[name]
     path = layout.write(tmp_path, FLANGE)
-    said = Said(layout.said.get("rotation"))
-    found, convention = read(path, picture_names(layout, FRAMES), said, check())
+    stated = StatedConvention(layout.stated.get("rotation"))
+    found, convention = read(path, picture_names(layout, FRAMES), stated, check())
     tolerance = 1e-3 * layout.digits_mm
     np.testing.assert_allclose(found[:, :3, 3], FLANGE[:, :3, 3], atol=tolerance)
     np.testing.assert_allclose(found[:, :3, :3], FLANGE[:, :3, :3], atol=3e-6)
@@ -96,19 +96,21 @@ def test_poses_the_other_way_round_are_found_out(tmp_path: Path, mount: Mount, w
     np.testing.assert_allclose(found, flange, atol=1e-7)
 
 
-def concluded(tmp_path: Path, text: str, said: Said = NOTHING_SAID, **more: float) -> Convention:
+def concluded(
+    tmp_path: Path, text: str, stated: StatedConvention = NOTHING_STATED, **more: float
+) -> Convention:
     """How rows of poses, in the pictures' order, are understood."""
     (tmp_path / "p.txt").write_text(text)
     pictures = [f"{n}.png" for n in range(FRAMES)]
-    return read(tmp_path / "p.txt", pictures, said, check(), **more)[1]
+    return read(tmp_path / "p.txt", pictures, stated, check(), **more)[1]
 
 
 def test_what_is_said_wrongly_is_taken_and_contradicted(tmp_path: Path) -> None:
     text = table(P_M, XYZW)
-    found = concluded(tmp_path, text, Said("quat_wxyz", "m", False))
+    found = concluded(tmp_path, text, StatedConvention("quat_wxyz", "m", False))
     assert found.rotation == "quat_wxyz"
     assert any("agree with the pictures only to" in words for words in found.contradicted)
-    found = concluded(tmp_path, text, Said("quat_wxyz"))
+    found = concluded(tmp_path, text, StatedConvention("quat_wxyz"))
     assert found.contradicted
 
 
@@ -132,15 +134,15 @@ def test_a_square_that_contradicts_the_poses_is_refused_with_the_one_that_fits(
 
     pictures = [f"{n}.png" for n in range(FRAMES)]
     if 0.6 < SQUARE_M / typed < 1.5:
-        _, convention = read(tmp_path / "p.txt", pictures, Said(), typed_check, typed)
+        _, convention = read(tmp_path / "p.txt", pictures, StatedConvention(), typed_check, typed)
         assert any(f"squares of {fits}" in words for words in convention.contradicted)
         return
     with pytest.raises(InputError, match=f"squares of {fits[:5]}"):
-        read(tmp_path / "p.txt", pictures, Said(), typed_check, typed)
+        read(tmp_path / "p.txt", pictures, StatedConvention(), typed_check, typed)
 
 
 def test_a_unit_said_wrongly_is_contradicted(tmp_path: Path) -> None:
-    found = concluded(tmp_path, table(P_M, XYZW), Said(unit="mm"))
+    found = concluded(tmp_path, table(P_M, XYZW), StatedConvention(unit="mm"))
     assert found.unit == "mm"
     assert any("by a factor of" in words for words in found.contradicted)
 

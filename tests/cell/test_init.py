@@ -33,11 +33,11 @@ def nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_any_answer_it_is_a_simulated_cell_that_can_be_planned(
     cell: Cell, tmp_path: Path
 ) -> None:
-    said = cell("init", tmp_path / "bench", "--json")
-    assert said.status == 0, said.err
-    assert "--robot sim (not given)" in said.err
+    result = cell("init", tmp_path / "bench", "--json")
+    assert result.status == 0, result.err
+    assert "--robot sim (not given)" in result.err
     path = tmp_path / "bench" / "cell.yaml"
-    assert json.loads(said.out)["file"] == str(path)
+    assert json.loads(result.out)["file"] == str(path)
     made = read_cell(path)
     assert nominal(made).simulation is not None
     assert cell("doctor", path).status == 0
@@ -70,12 +70,12 @@ def test_a_real_arm_is_asked_for_what_it_could_run_into(cell: Cell, tmp_path: Pa
         (REAL, "--workspace"),
         ((*REAL, *BOUNDS[:2]), "--keep-out"),
     ):
-        said = cell("init", tmp_path, *words)
-        assert said.status == 2
-        assert f"{missing} is needed" in said.err
+        result = cell("init", tmp_path, *words)
+        assert result.status == 2
+        assert f"{missing} is needed" in result.err
     assert not list(tmp_path.iterdir())
-    said = cell("init", tmp_path, *REAL, *BOUNDS)
-    assert said.status == 0, said.err
+    result = cell("init", tmp_path, *REAL, *BOUNDS)
+    assert result.status == 0, result.err
     made = read_cell(tmp_path / "cell.yaml")
     check_bounded(made)
     assert made.workspace is not None
@@ -106,6 +106,6 @@ def test_nothing_to_keep_out_is_an_answer_and_silence_is_none(cell: Cell, tmp_pa
 def test_an_answer_that_cannot_be_is_refused(
     cell: Cell, tmp_path: Path, words: tuple[str, ...], message: str
 ) -> None:
-    said = cell("init", tmp_path, *words)
-    assert said.status == 2
-    assert message in said.err
+    result = cell("init", tmp_path, *words)
+    assert result.status == 2
+    assert message in result.err

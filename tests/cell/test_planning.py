@@ -193,19 +193,21 @@ def test_views_keep_out_of_the_boxes_and_the_plan_says_what_it_promises() -> Non
 
 
 @pytest.mark.parametrize(
-    ("wish", "message"),
+    ("requirements", "message"),
     [
         (Requirements(40, 10, 30), "give two of --frames, --parallel and --varied"),
         (Requirements(10, 12), "--frames is less than"),
         (Requirements(frames=20, alpha_sigma_px=0.1), "says how many views by itself"),
     ],
 )
-def test_wishes_that_contradict_each_other_are_said(wish: Requirements, message: str) -> None:
+def test_requirements_that_contradict_each_other_are_refused(
+    requirements: Requirements, message: str
+) -> None:
     with pytest.raises(InputError, match=message):
-        wish.size_for(bench())
+        requirements.size_for(bench())
 
 
-def test_wishes_make_sizes() -> None:
+def test_requirements_make_sizes() -> None:
     sizes = {
         Requirements(): (10, 30),
         Requirements(frames=20): (5, 15),
@@ -214,8 +216,8 @@ def test_wishes_make_sizes() -> None:
         Requirements(parallel=4): (4, 30),
         Requirements(parallel=4, varied=6): (4, 6),
     }
-    for wish, (parallel, varied) in sizes.items():
-        assert wish.size_for(bench()) == PlanSize(parallel, varied)
+    for requirements, (parallel, varied) in sizes.items():
+        assert requirements.size_for(bench()) == PlanSize(parallel, varied)
     with pytest.raises(InputError, match="4 views do not make a calibration"):
         design_plan(bench(), PlanSize(2, 2))
 

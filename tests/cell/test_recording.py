@@ -263,13 +263,13 @@ def test_the_writer_notices_that_what_it_wrote_is_gone(
     with RecordingWriter.create(tmp_path / "r", header()) as writer:
         for frame in (0, 1):
             writer.append(FrameRecord(frame=frame), np.zeros((4, 4), np.uint8))
-        writer.check_whole()
+        writer.check_complete()
         harm(tmp_path / "r")
         with pytest.raises(DiskFailed, match=message) as caught:
             writer.append(FrameRecord(frame=2), np.zeros((4, 4), np.uint8))
         assert caught.value.exit_status == EXIT_DEVICE
         with pytest.raises(DiskFailed, match=message):
-            writer.check_whole()
+            writer.check_complete()
 
 
 def _replaced(path: Path) -> None:
@@ -285,7 +285,7 @@ def test_an_older_picture_that_is_gone_is_noticed_at_the_end(tmp_path: Path) -> 
             writer.append(FrameRecord(frame=frame), np.zeros((4, 4), np.uint8))
         (tmp_path / "r" / "images" / "00000.png").unlink()
         with pytest.raises(DiskFailed, match=r"00000.png: was deleted"):
-            writer.check_whole()
+            writer.check_complete()
 
 
 @pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(b"")])

@@ -38,7 +38,7 @@ from cell.storage.files.plan_file import Plan, View, read_plan
 from cell.storage.recording import Header, RecordingWriter, read_recording
 from drivers.arm import ArmState, MoveTarget
 from drivers.camera import Frame
-from drivers.errors import DeviceUnreachable, FrameLost, SafetyError, StopFailed
+from drivers.errors import DeviceUnreachable, FrameMissing, SafetyError, StopFailed
 from tests.cell.fakes import HOME, FakeArm, FakeCamera, FastClock
 from tests.cell.plans import CELL, PLAN
 
@@ -404,7 +404,7 @@ def test_the_operator_is_heard_while_the_camera_hangs(real_bench: Bench) -> None
 
 
 def test_a_lost_frame_is_taken_again_at_the_same_place(bench: Bench) -> None:
-    bench.camera.grabs = [FrameLost("incomplete"), None]
+    bench.camera.grabs = [FrameMissing("incomplete"), None]
     result = bench.run()
     assert (result.finish, result.frames) == (Finish.COMPLETED, 4)
     assert bench.arm.calls.count("move") == 4
@@ -412,7 +412,7 @@ def test_a_lost_frame_is_taken_again_at_the_same_place(bench: Bench) -> None:
 
 
 def test_a_view_without_a_frame_is_skipped_with_its_reason(bench: Bench) -> None:
-    bench.camera.grabs = [None] + [FrameLost("incomplete")] * 3
+    bench.camera.grabs = [None] + [FrameMissing("incomplete")] * 3
     result = bench.run()
     assert result.finish is Finish.COMPLETED_WITH_LOSSES
     assert result.finish.exit_status == EXIT_BAD_ANSWER

@@ -227,10 +227,10 @@ def test_the_verb_takes_files_and_folders_and_speaks_json(tmp_path: Path) -> Non
     assert reported.exit_code == 0
     assert "As mounted on the robot (hand-eye included): they agree" in reported.stdout
     assert page.stat().st_size > 20_000
-    said = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
-    assert said["schema"] == "cell.comparison/1"
-    assert said["mounted"]["beyond_chance"] is False
-    assert np.shape(said["camera"]["difference_px"]) == (4, 63, 2)
+    output = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
+    assert output["schema"] == "cell.comparison/1"
+    assert output["mounted"]["beyond_chance"] is False
+    assert np.shape(output["camera"]["difference_px"]) == (4, 63, 2)
 
 
 def test_a_folder_that_is_neither_is_refused(tmp_path: Path) -> None:

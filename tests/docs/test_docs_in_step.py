@@ -35,14 +35,14 @@ def test_the_readme_tour_says_what_it_shows(
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
     monkeypatch.chdir(tmp_path)
     tour = next(block for block in blocks(README) if block.language == "console")
-    said = {words[0]: run_command(words) for words in commands(tour)}
-    assert list(said) == ["doctor", "simulate", "calibrate", "diagnose", "export"]
+    output = {words[0]: run_command(words) for words in commands(tour)}
+    assert list(output) == ["doctor", "simulate", "calibrate", "diagnose", "export"]
     shown = README.read_text().split("names the bracket and nothing else:")[1]
     lines = [line.strip() for line in shown.splitlines() if line.startswith("    ")]
-    reported = said["diagnose"].splitlines()
+    reported = output["diagnose"].splitlines()
     assert_same("\n".join(reported[reported.index(lines[0]) :][:3]), "\n".join(lines))
-    assert said["diagnose"].count("\n- ") == 1
-    assert "distortion_model: plumb_bob" in said["export"]
+    assert output["diagnose"].count("\n- ") == 1
+    assert "distortion_model: plumb_bob" in output["export"]
     assert (tmp_path / "runs/bracket/diagnosis/report.html").exists()
 
 

@@ -28,17 +28,19 @@ TUTORIAL = PAGES[0]
 def test_from_a_dry_run_to_a_report_and_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
     monkeypatch.chdir(tmp_path)
-    said = {
+    output = {
         " ".join(words[:3]): run_command(words)
         for block in blocks(TUTORIAL)
         if block.language == "console"
         for words in commands(block)
     }
-    assert {name.split()[0] for name in said} >= {"doctor", "plan", "export"}
+    assert {name.split()[0] for name in output} >= {"doctor", "plan", "export"}
     assert (tmp_path / "runs/first/report.html").stat().st_size > 100_000
-    assert "verdict: explained" in said["run my-plan.yaml --dry-run"]
-    assert "focus_breathing" in said["run my-plan.yaml --dry-run"]
-    assert said["compare runs/first runs/second"].count("they agree within their uncertainty") == 2
+    assert "verdict: explained" in output["run my-plan.yaml --dry-run"]
+    assert "focus_breathing" in output["run my-plan.yaml --dry-run"]
+    assert (
+        output["compare runs/first runs/second"].count("they agree within their uncertainty") == 2
+    )
     camera = json.loads((tmp_path / "camera.json").read_text())
     assert camera["focus"]["law"] == "inverse_square"
     diagnosis = json.loads((tmp_path / "runs/broken/diagnosis/diagnosis.json").read_text())

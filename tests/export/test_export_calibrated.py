@@ -75,8 +75,8 @@ def test_mrcal_has_it_where_the_chain_does(tmp_path: Path) -> None:
     file.write_text(export_calibration(source, "mrcal", distance_m=distance_m).text)
     points, expected = _chain(source, distance_m)
     command = [MRCAL, "-c", MRCAL_PROJECTS, file, json.dumps(points.tolist())]
-    said = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
-    assert np.abs(np.array(json.loads(said)["pixels"]) - expected).max() < AGREES_PX
+    output = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+    assert np.abs(np.array(json.loads(output)["pixels"]) - expected).max() < AGREES_PX
 
 
 @pytest.mark.parametrize("tool", ["ros", "opencv", "mrcal", "kalibr", "colmap"])

@@ -55,11 +55,11 @@ def test_the_ros_2_command_and_the_ros_1_one_say_the_same(tmp_path: Path) -> Non
     for command, transform, frames in zip(
         commands, (CAMERA, BOARD), (("tool0", "wrist_camera"), ("base", "board")), strict=True
     ):
-        said = dict(re.findall(r"--([a-z-]+) (\S+)", command))
-        place = [float(said[k]) for k in ("x", "y", "z")]
-        turn = Rotation.from_quat([float(said[k]) for k in ("qx", "qy", "qz", "qw")])
+        output = dict(re.findall(r"--([a-z-]+) (\S+)", command))
+        place = [float(output[k]) for k in ("x", "y", "z")]
+        turn = Rotation.from_quat([float(output[k]) for k in ("qx", "qy", "qz", "qw")])
         close(matrix(place, turn), transform)
-        assert (said["frame-id"], said["child-frame-id"]) == frames
+        assert (output["frame-id"], output["child-frame-id"]) == frames
     old = re.findall(r"static_transform_publisher ([-\d. ]+) (\S+) (\S+)$", text, re.MULTILINE)
     numbers = np.array(old[0][0].split(), float)
     close(matrix(numbers[:3], Rotation.from_quat(numbers[3:])), CAMERA)

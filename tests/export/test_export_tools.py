@@ -149,9 +149,9 @@ def new_mrcal(mrcals: list[Path]) -> Path:
 
 def _mrcal_projection(python: Path, model: Path) -> FloatArray:
     command = [python, "-c", MRCAL_PROJECTS, model, json.dumps(POINTS_M.tolist())]
-    said = json.loads(_run(command))
-    assert said["size"] == [4096, 3072]
-    return np.array(said["pixels"])
+    output = json.loads(_run(command))
+    assert output["size"] == [4096, 3072]
+    return np.array(output["pixels"])
 
 
 def _run(command: list[str | Path]) -> str:

@@ -85,8 +85,8 @@ def test_the_address_may_be_left_out(words: list[str], filled: list[str]) -> Non
 def test_a_bad_address_touches_no_recording(tmp_path: Path) -> None:
     plan = plan_of(tmp_path)
     words = ["run", str(plan.path), "--dry-run", "-o", str(tmp_path / "run")]
-    said = CliRunner().invoke(app, [*words, "--page=somewhere"])
-    assert isinstance(said.exception, InputError)
+    result = CliRunner().invoke(app, [*words, "--page=somewhere"])
+    assert isinstance(result.exception, InputError)
     assert not (tmp_path / "run").exists()
 
 
@@ -329,7 +329,7 @@ def test_a_dry_run_is_stopped_through_its_page(tmp_path: Path) -> None:
         assert press(url, "stop")[0] == 200
         out, err = run.communicate(timeout=120)
     assert run.returncode == EXIT_OPERATOR, err
-    said = json.loads(out)
-    assert said["finish"] == "stopped_by_operator"
-    assert said["reason"] == "stopped by the page's Stop button"
-    assert len(read_recording(tmp_path / "run").frames) == said["frames"] < 39
+    result = json.loads(out)
+    assert result["finish"] == "stopped_by_operator"
+    assert result["reason"] == "stopped by the page's Stop button"
+    assert len(read_recording(tmp_path / "run").frames) == result["frames"] < 39

@@ -11,7 +11,7 @@ import made_up_cell
 
 from calib.calibration import Calibration, calibrate
 from calib.calibration.mapping import as_mapping
-from cell.views.report.sections.trust import sentences
+from cell.views.report.sections.limitations import sentences
 from cell.views.report.sections.uncertainty import uncertainty
 from cell.views.terminal.summary import calibration_summary
 from tests.paper.scene import mixed_scene

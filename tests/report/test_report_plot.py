@@ -29,12 +29,12 @@ def test_ticks_are_round(
 ) -> None:
     scale = Scale(low, high)
     assert scale.ticks(count) == pytest.approx(ticks)
-    assert scale.words(scale.ticks(count)) == words
+    assert scale.labels(scale.ticks(count)) == words
 
 
 def test_logarithmic_ticks_are_one_two_five() -> None:
     scale = scale_of(np.array([0.3, 6.0, 0.0, np.nan]), log=True)
-    assert scale.words(scale.ticks(5)) == ["0.5", "1", "2", "5"]
+    assert scale.labels(scale.ticks(5)) == ["0.5", "1", "2", "5"]
     assert scale.share(math.sqrt(scale.low * scale.high)) == pytest.approx(0.5)
 
 

@@ -18,9 +18,9 @@ from calib.calibration.mapping import as_mapping
 from cell.views.numbers import millimetres
 from cell.views.report import ReportData
 from cell.views.report.sections.answer import answer
+from cell.views.report.sections.limitations import sentences
 from cell.views.report.sections.tables import tables
-from cell.views.report.sections.trust import sentences
-from cell.views.report.sections.uncertainty import in_words, uncertainty
+from cell.views.report.sections.uncertainty import quantity_names, uncertainty
 from cell.views.report.workpiece_error import of_solution
 from tests.paper.scene import scene
 
@@ -107,7 +107,7 @@ def test_the_first_sentence_counts_what_all_pictures_share() -> None:
 
 
 def test_numbers_that_go_together_are_told_as_a_reader_knows_them() -> None:
-    assert in_words(["flange_from_camera.z", "base_from_camera.rx", "v0_px", "focal"]) == [
+    assert quantity_names(["flange_from_camera.z", "base_from_camera.rx", "v0_px", "focal"]) == [
         "the camera's place along z on the flange",
         "the camera's turn about x in the base",
         "the principal point v0",

@@ -11,7 +11,7 @@ from calib.chain.model import evaluate
 from calib.chain.optics import COLUMN
 from drivers.arm import Motion, MoveTarget
 from drivers.camera import FocusSetting
-from drivers.errors import DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceRefused, DeviceUnreachable, FrameMissing
 from sim.arm import SETTLE_S, Repeatability
 from sim.build import build
 from sim.camera import optics_focused_at
@@ -192,7 +192,7 @@ def test_lost_frames_and_a_dead_camera():
     _, camera, _ = ready(ur3_robotiq())
     camera.faults.lose_frames = 2
     for _ in range(2):
-        with pytest.raises(FrameLost):
+        with pytest.raises(FrameMissing):
             camera.grab(0.5)
     assert camera.grab(0.5).image.any()
     camera.faults.dead = True

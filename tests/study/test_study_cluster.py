@@ -103,9 +103,9 @@ def test_a_cluster_that_dies_bit_by_bit_costs_nothing_that_was_done(tmp_path: Pa
         first = (line for line in client.stderr if "compiling" not in line)
         assert f"{address} has no workers any more" in next(first)
         scheduler.kill()
-        _, said = client.communicate(timeout=120)
-    assert client.returncode == 3, said
-    assert said == (
+        _, output = client.communicate(timeout=120)
+    assert client.returncode == 3, output
+    assert output == (
         "error: the Dask scheduler went away; what was done is written: give the same command"
         " again when it is back\n"
     )

@@ -23,15 +23,15 @@ def test_the_page_says_what_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("COLUMNS", "100")
     names: dict[str, object] = {}
     found = blocks(PAGE)
-    said = ""
+    output = ""
     for block in found:
         if block.language == "console":
             (words,) = commands(block)
-            said = run_command(words)
+            output = run_command(words)
         elif block.language == "python":
-            said = run_python(block.code, block.line, PAGE, names)
+            output = run_python(block.code, block.line, PAGE, names)
         elif block.language == "text":
-            assert_same(said, block.code, relative=0.2)
+            assert_same(output, block.code, relative=0.2)
     assert (tmp_path / "runs/by-hand/results").is_dir()
 
 

@@ -34,8 +34,8 @@ from cell.verbs.study.trial import truth_of
 from tests.study.killers import KILLER, kill_or_work
 from tests.study.studies import seeds, study, write_plan, write_study
 
-Said = tuple[int, str, str]
-Cell = Callable[..., Said]
+CommandResult = tuple[int, str, str]
+Cell = Callable[..., CommandResult]
 
 
 def rows_on_disk(folder: Path, table: str = RESULTS) -> list[dict[str, Any]]:
@@ -61,13 +61,13 @@ def scheduler() -> Iterator[str]:
 @pytest.fixture
 def cell(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., Said]:
-    def call(*words: str | Path) -> Said:
+) -> Callable[..., CommandResult]:
+    def call(*words: str | Path) -> CommandResult:
         monkeypatch.setattr(sys, "argv", ["cell", *map(str, words)])
         with pytest.raises(SystemExit) as left:
             main()
-        said = capsys.readouterr()
-        return int(left.value.code or 0), said.out, said.err
+        output = capsys.readouterr()
+        return int(left.value.code or 0), output.out, output.err
 
     return call
 
@@ -121,11 +121,11 @@ def test_ctrl_c_stops_with_status_4_and_the_rest_is_done_later(
         assert running.poll() is None
         time.sleep(0.02)
     os.killpg(running.pid, signal.SIGINT)
-    _, said = running.communicate(timeout=60)
+    _, output = running.communicate(timeout=60)
     done = rows_on_disk(folder)
-    assert running.returncode == 4, said
+    assert running.returncode == 4, output
     assert 0 < len(done) < 4
-    assert said == (
+    assert output == (
         f"error: Ctrl-C: {len(done)} of 4 tasks are done and written to {folder}; the same"
         " command goes on from there\n"
     )

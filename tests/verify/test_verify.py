@@ -198,12 +198,12 @@ def test_corners_that_are_not_on_the_board_are_refused() -> None:
 
 def test_the_file_s_own_words_and_the_page_hold_all_of_it() -> None:
     checked = _checked(new_views(4, camera=KNOCK), known=KnownLength(0.225, 2e-5, LONG))
-    said, page = text(checked.content), render(checked, simulated=True)
+    output, page = text(checked.content), render(checked, simulated=True)
     for words in ("Moved", "hand-eye differs", "SIMULATED", "<svg", "Error of length measurement"):
         assert words in page
-    assert said.startswith("verdict: moved")
-    assert "one sigma px" in said
-    assert "limit px" in said
+    assert output.startswith("verdict: moved")
+    assert "one sigma px" in output
+    assert "limit px" in output
 
 
 def test_the_views_chosen_know_more_than_as_many_taken_evenly() -> None:

@@ -48,11 +48,11 @@ def test_a_recording_that_agrees_leaves_with_0(
     monkeypatch.setattr(sys, "argv", [])
     length = ("--length-m", "0.225", "--length-sigma-m", "0.00002", "--corners", "0,0:0,9")
     assert _cell("verify", bench / "same", bench / "old", *length, "--json") == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["verdict"] == "good"
-    assert abs(said["length"]["error_m"]) < 4 * said["length"]["sigma_m"]
+    output = json.loads(capsys.readouterr().out)
+    assert output["verdict"] == "good"
+    assert abs(output["length"]["error_m"]) < 4 * output["length"]["sigma_m"]
     written = json.loads((bench / "same/verify/verify.json").read_text())
-    assert written == said
+    assert written == output
     schema = json.loads((FOLDER / "verify.schema.json").read_text())
     jsonschema.validate(written, schema)
     assert (bench / "same/verify/verify.html").stat().st_size > 50_000
@@ -77,9 +77,9 @@ def test_a_plan_s_most_telling_views_are_run_and_checked(
     monkeypatch.setattr(sys, "argv", [])
     words = ("verify", PLAN, bench / "old", "--dry-run", "--views", "6", "-o", tmp_path / "now")
     assert _cell(*words, "--json") == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["verdict"] == "good"
-    assert len(said["frames_used"]) == 6
+    output = json.loads(capsys.readouterr().out)
+    assert output["verdict"] == "good"
+    assert len(output["frames_used"]) == 6
     assert (tmp_path / "now/frames.jsonl").read_text().count("\n") == 6
 
 

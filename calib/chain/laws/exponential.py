@@ -38,7 +38,7 @@ def from_both(values: Sequence[FloatArray], ranges: Sequence[Range]) -> Sequence
     ]
 
 
-def words(names: Sequence[str], ranges: Sequence[Range], numbers: Numbers) -> str:
+def terms(names: Sequence[str], ranges: Sequence[Range], numbers: Numbers) -> str:
     """The exponential in symbols."""
     constant = f"{numbers['constant']:.4g}"
     if numbers["from_end"]:

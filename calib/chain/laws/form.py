@@ -84,7 +84,7 @@ class Form:
         Sets of numbers worth trying, given the covariates' values and ranges.
     fits:
         Whether the form makes sense for a covariate of that name, with these values.
-    words:
+    terms:
         The equation, from the names of the covariates, their ranges and the numbers: one term
         for each function.
     own_constant:
@@ -100,7 +100,7 @@ class Form:
     of: Functions
     tried: Callable[[Sequence[FloatArray], Sequence[Range]], Sequence[Numbers]]
     fits: Callable[[str, FloatArray], bool]
-    words: Callable[[Sequence[str], Sequence[Range], Numbers], Sequence[str]]
+    terms: Callable[[Sequence[str], Sequence[Range], Numbers], Sequence[str]]
     own_constant: bool = False
 
 

@@ -33,6 +33,6 @@ FORM = Form(
     of=_of,
     tried=_tried,
     fits=many_valued,
-    words=lambda names, ranges, numbers: [f"max(0, {names[0]} - {numbers['at']:.4g})"],
+    terms=lambda names, ranges, numbers: [f"max(0, {names[0]} - {numbers['at']:.4g})"],
     own_constant=True,
 )

@@ -13,6 +13,6 @@ FORM = Form(
     of=lambda x, ranges, numbers: (ranges[0].kept(x[0]) - ranges[0].middle)[:, None],
     tried=nothing_to_try,
     fits=many_valued,
-    words=lambda names, ranges, numbers: [f"({names[0]} - {ranges[0].middle:.4g})"],
+    terms=lambda names, ranges, numbers: [f"({names[0]} - {ranges[0].middle:.4g})"],
     own_constant=True,
 )

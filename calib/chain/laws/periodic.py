@@ -31,7 +31,7 @@ def _tried(values: Sequence[FloatArray], ranges: Sequence[Range]) -> Sequence[Nu
     return [{"cycles": float(c)} for c in 2.0 * np.pi * frequency]
 
 
-def _words(names: Sequence[str], ranges: Sequence[Range], numbers: Numbers) -> Sequence[str]:
+def _terms(names: Sequence[str], ranges: Sequence[Range], numbers: Numbers) -> Sequence[str]:
     cycles = numbers["cycles"]
     return [f"sin({cycles:.5g} {names[0]})", f"cos({cycles:.5g} {names[0]})"]
 
@@ -45,5 +45,5 @@ FORM = Form(
     of=_of,
     tried=_tried,
     fits=lambda name, value: name == "time" or name.startswith("joint_"),
-    words=_words,
+    terms=_terms,
 )

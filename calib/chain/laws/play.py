@@ -13,5 +13,5 @@ FORM = Form(
     of=lambda x, ranges, numbers: x[0][:, None],
     tried=nothing_to_try,
     fits=lambda name, value: "approach" in name or "side" in name,
-    words=lambda names, ranges, numbers: [names[0]],
+    terms=lambda names, ranges, numbers: [names[0]],
 )

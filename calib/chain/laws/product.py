@@ -25,6 +25,6 @@ FORM = Form(
     of=lambda x, ranges, numbers: (ranges[0].kept(x[0]) * ranges[1].kept(x[1]))[:, None],
     tried=nothing_to_try,
     fits=_fits,
-    words=lambda names, ranges, numbers: [f"{names[0]} * {names[1]}"],
+    terms=lambda names, ranges, numbers: [f"{names[0]} * {names[1]}"],
     own_constant=True,
 )

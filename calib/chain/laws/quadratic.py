@@ -24,7 +24,7 @@ FORM = Form(
     of=_of,
     tried=nothing_to_try,
     fits=lambda name, value: many_valued(name, value) and name not in ("time", "order"),
-    words=lambda names, ranges, numbers: [
+    terms=lambda names, ranges, numbers: [
         f"({names[0]} - {ranges[0].middle:.4g})",
         f"({names[0]} - {ranges[0].middle:.4g})^2",
     ],

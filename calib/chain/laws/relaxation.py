@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from calib.chain.laws.exponential import decay, from_low, like_time, words
+from calib.chain.laws.exponential import decay, from_low, like_time, terms
 from calib.chain.laws.form import Form, Number, many_valued
 
 FORM = Form(
@@ -14,6 +14,6 @@ FORM = Form(
     of=lambda x, ranges, numbers: decay(x[0], ranges[0], numbers)[:, None],
     tried=from_low,
     fits=lambda name, value: many_valued(name, value) and like_time(name),
-    words=lambda names, ranges, numbers: [words(names, ranges, numbers)],
+    terms=lambda names, ranges, numbers: [terms(names, ranges, numbers)],
     own_constant=True,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from calib.chain.laws.exponential import decay, from_both, like_time, words
+from calib.chain.laws.exponential import decay, from_both, like_time, terms
 from calib.chain.laws.form import Form, Number, many_valued
 
 FORM = Form(
@@ -14,6 +14,6 @@ FORM = Form(
     of=lambda x, ranges, numbers: (1.0 - decay(x[0], ranges[0], numbers))[:, None],
     tried=from_both,
     fits=lambda name, value: many_valued(name, value) and not like_time(name),
-    words=lambda names, ranges, numbers: [f"(1 - {words(names, ranges, numbers)})"],
+    terms=lambda names, ranges, numbers: [f"(1 - {terms(names, ranges, numbers)})"],
     own_constant=True,
 )

@@ -38,5 +38,5 @@ FORM = Form(
     of=lambda x, ranges, numbers: (x[0] >= numbers["at"]).astype(np.float64)[:, None],
     tried=_tried,
     fits=lambda name, value: "approach" not in name and "side" not in name,
-    words=lambda names, ranges, numbers: [f"[{names[0]} >= {numbers['at']:.4g}]"],
+    terms=lambda names, ranges, numbers: [f"[{names[0]} >= {numbers['at']:.4g}]"],
 )

@@ -86,12 +86,14 @@ def begin_with_law(search: Search) -> Cell | None:
     None where there is none, or where it is a name's own physics.
     """
     before = search.best
-    told = demanded(search)
-    if not told or any(along_its_own(effect, told[0].found.law) for effect in catalogue()):
+    best_first = demanded(search)
+    if not best_first or any(
+        along_its_own(effect, best_first[0].found.law) for effect in catalogue()
+    ):
         return None
-    search.take_in(told[0].candidate, told[0].trial.fit)
+    search.take_in(best_first[0].candidate, best_first[0].trial.fit)
     search.run()
-    return as_cell(told, before)
+    return as_cell(best_first, before)
 
 
 def along_its_own(effect: Effect, law: Law) -> bool:

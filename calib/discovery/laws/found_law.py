@@ -144,7 +144,7 @@ def _swinging(law: Law, fitted: _Fitted) -> dict[str, Value]:
 
 def _equation(law: Law, values: Mapping[str, float]) -> str:
     names = [covariate.name for covariate in law.covariates]
-    terms = law.form.words(names, law.ranges, values)
+    terms = law.form.terms(names, law.ranges, values)
     lines = []
     for k in law.components:
         component, unit, _ = law.site.components[k]

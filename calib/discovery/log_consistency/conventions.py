@@ -52,7 +52,7 @@ def _transposed(pose: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Convention:
-    words: str
+    description: str
     read: Callable[[FloatArray], FloatArray]
     inverts: bool = False
 
@@ -95,7 +95,7 @@ def find_conventions(views: Views, loop: FloatArray) -> ConventionsFound:
         return ConventionsFound((), None)
     chosen, closure = _AS_LOGGED, logged
     if logged.typical_angle_rad > _ANGLE_SUSPECT_RAD:
-        angles = (_Convention(words, read) for words, read in readings())
+        angles = (_Convention(description, read) for description, read in readings())
         for convention in (*_OTHERS, *angles):
             read = convention.read(views.base_from_flange)
             tried = close_loop(loop, read, free_length=True)
@@ -135,7 +135,7 @@ def _rotation_mixup(convention: _Convention, before: Closure, after: Closure) ->
     return Mixup(
         name="rotation_convention",
         physics=(
-            f"The log's poses are not what they should be: {convention.words}"
+            f"The log's poses are not what they should be: {convention.description}"
             f"{_OR_MOUNT if inverts else ''}."
         ),
         remedy=(
@@ -165,10 +165,10 @@ def _unit_mixup(unit: str, closure: Closure) -> Mixup:
         pose[:, :3, 3] *= size
         return replace(views, base_from_flange=pose)
 
-    words = f"in {name}s" if unit == name else f"{1.0 / UNITS[name]:g} times too small"
+    description = f"in {name}s" if unit == name else f"{1.0 / UNITS[name]:g} times too small"
     return Mixup(
         name="length_unit",
-        physics=f"The log says metres, but its positions are {words}.",
+        physics=f"The log says metres, but its positions are {description}.",
         remedy="Correct the unit in the program that writes the log.",
         mend=mend,
         parameters={"metres_per_unit": (size, "m")},

@@ -19,7 +19,7 @@ class CornerOrder:
 
     Attributes
     ----------
-    words:
+    description:
         What was done to rows and columns.
     place:
         (M,) number that corner k truly has.
@@ -27,7 +27,7 @@ class CornerOrder:
         (4, 4) where a corner of a flat board truly is, from where its number says.
     """
 
-    words: str
+    description: str
     place: NDArray[np.int64]
     true_from_named: FloatArray
 
@@ -46,8 +46,10 @@ def corner_orders(board: Board) -> list[CornerOrder]:
         orders["the board is turned by three quarters"] = np.rot90(grid, 3)
         orders["rows and columns are exchanged and run backwards"] = grid[::-1, ::-1].T
     return [
-        CornerOrder(words, np.asarray(order).ravel(), _rigid(board, np.asarray(order).ravel()))
-        for words, order in orders.items()
+        CornerOrder(
+            description, np.asarray(order).ravel(), _rigid(board, np.asarray(order).ravel())
+        )
+        for description, order in orders.items()
     ]
 
 
@@ -80,7 +82,9 @@ def find_corner_orders(views: Views, odd: OddFrames, camera_from_board: FloatArr
             found.setdefault(int(views.frame[i]), order)
     if not found:
         return None
-    reported = ", ".join(f"frame {frame}: {order.words}" for frame, order in sorted(found.items()))
+    reported = ", ".join(
+        f"frame {frame}: {order.description}" for frame, order in sorted(found.items())
+    )
     return Mixup(
         name="corner_order",
         physics=f"Corners are numbered otherwise than in the other frames: {reported}.",

@@ -97,7 +97,7 @@ def _shifted_run(views: Views, sources: Sources, miss: tuple[float, float]) -> M
         "to_frame": (float(frames[-1]), "frame"),
         "frames": (float(len(frames)), "frame"),
     }
-    words = _words(sources, {int(frame): k for k, frame in enumerate(views.frame)})
+    words = _described(sources, {int(frame): k for k, frame in enumerate(views.frame)})
     if twice:
         words += "; " + ", ".join(f"pose {pose} was taken twice" for pose in twice)
     return Mixup(
@@ -116,7 +116,7 @@ def _twice(views: Views, sources: Sources) -> list[int]:
     return sorted(pose for pose, times in count.items() if times > 1)
 
 
-def _words(sources: Sources, place: Mapping[int, int]) -> str:
+def _described(sources: Sources, place: Mapping[int, int]) -> str:
     """Runs of the same shift, counted in recorded frames, in one clause; the others one by one."""
 
     def shift(frame: int) -> int | None:

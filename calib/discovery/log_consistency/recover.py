@@ -15,7 +15,7 @@ class Recovered:
     """Views with what could be worked out filled in, and sentences that say what was."""
 
     views: Views
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def recover_poses(views: Views) -> Recovered:

@@ -20,14 +20,14 @@ Order = Literal["xyz", "XYZ", "ZYX", "zyx", "ZYZ", "ZXZ"]
 class _Rule:
     """Three numbers for a rotation: how they are read from it, and how they make one."""
 
-    words: str
+    description: str
     numbers: Callable[[Rotation], FloatArray]
     rotation: Callable[[FloatArray], Rotation]
 
 
-def _angles(order: Order, words: str) -> _Rule:
+def _angles(order: Order, description: str) -> _Rule:
     return _Rule(
-        words,
+        description,
         lambda rotation: np.asarray(rotation.as_euler(order, suppress_warnings=True)),
         lambda numbers: Rotation.from_euler(order, numbers),
     )
@@ -53,7 +53,7 @@ def readings() -> tuple[tuple[str, Callable[[FloatArray], FloatArray]], ...]:
     """What the log's rotations might be, in words, and (N, 4, 4) poses read so."""
     return tuple(
         (
-            f"its rotation was written as {wrote.words} and read as {took.words}",
+            f"its rotation was written as {wrote.description} and read as {took.description}",
             _reading(wrote, took),
         )
         for wrote, took in permutations(RULES, 2)

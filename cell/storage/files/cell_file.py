@@ -247,13 +247,13 @@ class CellFile(Part):
     simulation: Simulation | None = None
 
     @model_serializer(mode="wrap")
-    def _with_what_was_said(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _with_stated_keep_out(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # that nothing is to be kept out of is something else than not having said so
         data: dict[str, Any] = serialize(self)
-        return data | ({"keep_out": []} if self.says_keep_out and not self.keep_out else {})
+        return data | ({"keep_out": []} if self.states_keep_out and not self.keep_out else {})
 
     @property
-    def says_keep_out(self) -> bool:
+    def states_keep_out(self) -> bool:
         """Whether the file has the key, if only to say that there is nothing."""
         return "keep_out" in self.model_fields_set
 

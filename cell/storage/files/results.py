@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from cell.errors import InputError
+from cell.storage.atomic import write_atomically
 from cell.storage.incoming.paths import reason
-from cell.storage.whole import write_whole
 
 
 def results_folder(recording: Path, name: str, kind: str) -> Path:
@@ -31,7 +31,7 @@ def write_results(folder: Path, files: Mapping[str, str]) -> None:
     """Write texts by their file names; raises `InputError` where the folder cannot be written."""
     make_folder(folder)
     for name, content in files.items():
-        write_whole(folder / name, content)
+        write_atomically(folder / name, content)
 
 
 def make_folder(folder: Path) -> None:

@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from cell.errors import InputError
-from cell.storage.whole import write_whole
+from cell.storage.atomic import write_atomically
 
 _ONE_LINE = 4
 """Depth of nesting that still fits a line, with all its values being short."""
@@ -44,7 +44,7 @@ def check_new(path: Path) -> None:
 
 def write_new(path: Path, text: str) -> None:
     """Write a file that is not there yet; raises `InputError`."""
-    write_whole(path, text, replace=False)
+    write_atomically(path, text, replace=False)
 
 
 def _null(representer: Any, value: None) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 
 from calib.views import Board, FloatArray
 from cell.errors import InputError
+from cell.storage.atomic import atomic_file
 from cell.storage.incoming import read_text
 from cell.storage.incoming.limits import (
     CORNERS,
@@ -22,7 +23,6 @@ from cell.storage.incoming.limits import (
     LOG_BYTES,
     PIXELS,
 )
-from cell.storage.whole import whole_file
 
 FILE_NAME = "detections.csv"
 COLUMNS = ("frame", "row", "col", "u_px", "v_px")
@@ -111,7 +111,7 @@ def read_corners(path: Path, board: Board) -> Corners:
 
 def write_corners(path: Path, corners: Corners, board: Board) -> None:
     """Write a `detections.csv`, whole or not at all (an older one of that name is replaced)."""
-    with whole_file(path, newline="") as file:
+    with atomic_file(path, newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS + EXTRA_COLUMNS if corners.sigma_px else COLUMNS)
         for frame in sorted(corners.px):

@@ -18,10 +18,10 @@ def disk_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as fault:
-        raise DiskFailed(_words(path, fault)) from None
+        raise DiskFailed(_message(path, fault)) from None
 
 
-def _words(path: Path, fault: OSError) -> str:
+def _message(path: Path, fault: OSError) -> str:
     if isinstance(fault, FileExistsError):
         return (
             f"{fault.filename or path}: is there already and is never overwritten. Move it away, or"

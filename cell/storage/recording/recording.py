@@ -17,10 +17,10 @@ from cell.errors import InputError
 from cell.storage.incoming import inside, plain_file, read_picture
 from cell.storage.recording import corners as corner_file
 from cell.storage.recording import frames as frame_file
+from cell.storage.recording.additional_columns import additional_labels, additional_numbers
 from cell.storage.recording.corners import Corners, check_corners, read_corners
 from cell.storage.recording.frame_log import VECTORS, read_frames
 from cell.storage.recording.frames import FrameRecord
-from cell.storage.recording.further import further_numbers, further_words
 from cell.storage.recording.header import Header, read_header
 from cell.storage.recording.thumbnail import KEPT, shrunk
 
@@ -181,8 +181,8 @@ def frames_as_views(
         robot_model=header.robot.model,
         payload_kg=header.robot.payload_kg,
         moving=header.capture.mode == "moving",
-        extra=further_numbers(_further(frames)),
-        labels=further_words(_further(frames)),
+        extra=additional_numbers(_additional(frames)),
+        labels=additional_labels(_additional(frames)),
         **columns,
         **_corner_columns(frames, corners or Corners({}), blank),
     )
@@ -210,7 +210,7 @@ def _stack(frames: Sequence[FrameRecord], name: str, blank: Views) -> FloatArray
     return column
 
 
-def _further(frames: Sequence[FrameRecord]) -> list[dict[str, Any]]:
+def _additional(frames: Sequence[FrameRecord]) -> list[dict[str, Any]]:
     """What every frame's line says under keys that have no column of their own."""
     return [
         {k: v for k, v in frame.model_dump().items() if k not in _NO_COVARIATES} for frame in frames

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cell.errors import InputError
+from cell.storage.atomic import sync_folder, write_atomically
 from cell.storage.files.writing import yaml_text
 from cell.storage.incoming import inside, plain_file, read_bytes
 from cell.storage.incoming.limits import PICTURE_BYTES
@@ -21,11 +22,10 @@ from cell.storage.incoming.paths import reason
 from cell.storage.recording import disk
 from cell.storage.recording import frames as frame_file
 from cell.storage.recording import header as header_file
+from cell.storage.recording.file_watch import FileWatch
 from cell.storage.recording.frame_log import read_frames
 from cell.storage.recording.frames import FrameRecord
 from cell.storage.recording.header import Header, write_header
-from cell.storage.recording.kept_files import KeptFiles
-from cell.storage.whole import sync_folder, write_whole
 
 _PNG_FAST = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 UNLOGGED = "unlogged"
@@ -45,7 +45,7 @@ class RecordingWriter:
         self.header = header
         self._images = pictures_folder(folder, header)
         self._lines = (folder / frame_file.FILE_NAME).open("ab", buffering=0)
-        self._kept = KeptFiles(self._lines, folder / frame_file.FILE_NAME, self._images)
+        self._kept = FileWatch(self._lines, folder / frame_file.FILE_NAME, self._images)
 
     @classmethod
     def create(cls, folder: Path, header: Header) -> RecordingWriter:
@@ -119,7 +119,7 @@ class RecordingWriter:
             self._kept.line_written(record)
         return record
 
-    def check_whole(self) -> None:
+    def check_complete(self) -> None:
         """Raise `DiskFailed` where anything that this writer wrote is no longer in its place."""
         with disk.disk_errors(self.folder):
             self._kept.check_all()
@@ -156,7 +156,7 @@ class RecordingWriter:
         disk_errors = self.header.as_mapping()
         disk_errors = {k: v for k, v in disk_errors.items() if k not in extra} | kept
         self.header = Header.model_validate(disk_errors)
-        write_whole(self.folder / header_file.FILE_NAME, yaml_text(disk_errors))
+        write_atomically(self.folder / header_file.FILE_NAME, yaml_text(disk_errors))
 
     def close(self) -> None:
         """Let go of the files. Idempotent."""

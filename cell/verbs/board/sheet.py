@@ -6,8 +6,8 @@ from pathlib import Path
 
 from calib.views import Board
 from cell.errors import InputError
+from cell.storage.atomic import atomic_file
 from cell.storage.files.board_file import board_file
-from cell.storage.whole import whole_file
 from cell.verbs.board.pattern import dark, size_mm
 from cell.verbs.board.vector_page import Line, VectorPage
 
@@ -51,7 +51,7 @@ def draw_board(board: Board, path: Path, paper: str | None = None) -> tuple[floa
     if suffix not in SUFFIXES:
         raise InputError(f"-o {path}: must end with {' or '.join(SUFFIXES)}")
     page = sheet(board, paper)
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         file.write(page.pdf() if suffix == ".pdf" else page.svg())
     return page.width_mm, page.height_mm
 

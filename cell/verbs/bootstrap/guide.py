@@ -21,20 +21,20 @@ from cell.sequencer.shot import Shot
 from cell.sequencer.watcher import Checked
 from cell.storage.files.cell_file import CellFile, Layout
 from cell.storage.files.plan_file import View
-from cell.verbs.bootstrap.knowledge import Knowledge
+from cell.verbs.bootstrap.estimate import Knowledge
 from cell.verbs.bootstrap.layout_uncertainty import LayoutUncertainty
 from cell.verbs.bootstrap.near_guard import NearGuard
 from cell.verbs.bootstrap.plausible import check_moves, check_place
 from cell.verbs.bootstrap.probing_views import (
     OFF_THE_MIDDLE_RAD,
+    PROBING_VIEWS,
     SHARES,
     TO_THE_MIDDLE,
-    WISHES,
     off_the_middle_rad,
     towards_the_middle,
 )
 from cell.verbs.bootstrap.reach import Reach
-from cell.verbs.bootstrap.seen import Seen
+from cell.verbs.bootstrap.visibility import Seen
 from drivers.errors import SafetyError
 
 _AFTER_A_LOSS = 0.6
@@ -74,7 +74,7 @@ class BootstrapGuide(Guide):
         self._centre_m = cell.board.board().corners_m.mean(axis=0)
         self._seen = Seen(cell)
         self._new: list[tuple[Shot, Detection]] = []
-        self._wishes = list(WISHES)
+        self._remaining_views = list(PROBING_VIEWS)
         self._here = guard.start_rad
         self._middle: float | None = None
         self._lost = 0
@@ -99,7 +99,7 @@ class BootstrapGuide(Guide):
             The frames contradict the cell file.
         """
         self._learn()
-        view = None if self.knowledge is None else self._next_wish(self.knowledge)
+        view = None if self.knowledge is None else self._next_view(self.knowledge)
         if view is None and not self._is_back:
             self._is_back = True
             view = view_of("back where it started", self._guard.start_rad)
@@ -139,37 +139,37 @@ class BootstrapGuide(Guide):
         fixed = self.layout.fixed.transform().as_matrix()
         return CellModel(optics_row(alpha_px=alpha_px, beta_px=alpha_px), mounted, fixed)
 
-    def _next_wish(self, known: Knowledge) -> View | None:
+    def _next_view(self, known: Knowledge) -> View | None:
         reach = Reach.of(known, self._guard, self._here)
-        boldness = _AFTER_A_LOSS**self._lost
+        step_share = _AFTER_A_LOSS**self._lost
         first, centre = known.first_camera_from_board, self._centre_m
         if self._middle is None:
             self._middle = 0.0
             if off_the_middle_rad(first, centre) > OFF_THE_MIDDLE_RAD:
                 way = partial(towards_the_middle, first, centre)
-                self._middle, view = self._largest(TO_THE_MIDDLE, way, reach, boldness)
+                self._middle, view = self._largest(TO_THE_MIDDLE, way, reach, step_share)
                 if view is not None:
                     return view
         reference = towards_the_middle(first, centre, self._middle)
-        for wish in self._wishes:
-            way = partial(wish.camera_from_board, reference, centre)
-            _, view = self._largest(wish.name, way, reach, boldness)
+        for view_wanted in self._remaining_views:
+            way = partial(view_wanted.camera_from_board, reference, centre)
+            _, view = self._largest(view_wanted.name, way, reach, step_share)
             if view is not None:
-                self._wishes.remove(wish)  # the others may be possible when more is known
+                self._remaining_views.remove(view_wanted)  # others: when more is known
                 return view
         return None
 
     def _largest(
-        self, name: str, way: Callable[[float], FloatArray], reach: Reach, boldness: float
+        self, name: str, way: Callable[[float], FloatArray], reach: Reach, step_share: float
     ) -> tuple[float, View | None]:
-        """The largest share of a wish that may be fulfilled, and its view; 0, None where none."""
+        """The largest reachable share of a wanted view, and the view; 0, None where none."""
         for share in SHARES:
             try:
-                joints = reach.joints(way(boldness * share), name)
+                joints = reach.joints(way(step_share * share), name)
             except SafetyError as refusal:
                 self.refusal = str(refusal)
                 continue
-            return boldness * share, view_of(name, joints)
+            return step_share * share, view_of(name, joints)
         return 0.0, None
 
 

@@ -23,7 +23,7 @@ from cell.storage.files.plan_file import View
 from cell.verbs.bootstrap.guide import BootstrapGuide, view_of
 from cell.verbs.bootstrap.layout_uncertainty import LayoutUncertainty
 from cell.verbs.bootstrap.near_guard import NearGuard
-from cell.verbs.bootstrap.seen import Seen
+from cell.verbs.bootstrap.visibility import Seen
 from drivers.errors import SafetyError
 
 _LARGEST_M, _SMALLEST_M = 0.02, 0.006

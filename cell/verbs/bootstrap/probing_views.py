@@ -31,7 +31,7 @@ class ProbingView:
     def camera_from_board(
         self, reference: FloatArray, centre_m: FloatArray, share: float
     ) -> FloatArray:
-        """(4, 4) from a reference view's (4, 4), at a share of the wish's full size."""
+        """(4, 4) from a reference view's (4, 4), at a share of the full displacement."""
         centre = reference[:3, :3] @ centre_m + reference[:3, 3]
         turn = rigid.compose(share * np.radians(self.turn_deg), np.zeros(3))
         goal = turn @ reference
@@ -60,7 +60,7 @@ def towards_the_middle(first: FloatArray, centre_m: FloatArray, share: float) ->
     return goal
 
 
-WISHES = (
+PROBING_VIEWS = (
     ProbingView("turned a little", (0, 0, 6)),
     ProbingView("tilted a little", (6, 0, 0)),
     ProbingView("tilted a little to the side", (0, 6, 0)),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from calib.chain.kinematics import OutOfReach
 from calib.views import FloatArray
-from cell.verbs.bootstrap.knowledge import Knowledge
+from cell.verbs.bootstrap.estimate import Knowledge
 from cell.verbs.bootstrap.near_guard import NearGuard
 from drivers.errors import SafetyError
 
@@ -40,7 +40,7 @@ class Reach:
         SafetyError
             It cannot be taken, or is not sure to show the whole board.
         """
-        pose = self.known.flange_that_sees(camera_from_board)
+        pose = self.known.flange_for_camera_pose(camera_from_board)
         start = self.guard.start_rad
         try:
             joints = self.guard.kinematics.inverse(pose, start)
@@ -48,6 +48,6 @@ class Reach:
             raise SafetyError(f"{name}: {far}") from None
         self.guard.check_move(self.here_rad, joints, name)
         self.guard.check_move(joints, start, name)
-        if not self.known.surely_sees_whole(pose):
+        if not self.known.whole_board_visible(pose):
             raise SafetyError(f"{name}: the board might not be whole in the picture")
         return joints

@@ -20,12 +20,12 @@ from cell.sequencer.watcher import Watcher
 from cell.storage.files.cell_file import CellFile, read_cell
 from cell.storage.files.plan_file import SCHEMA, Plan, PlanFile
 from cell.storage.files.writing import check_new, write_new, yaml_text
-from cell.verbs.bootstrap.found import Found
 from cell.verbs.bootstrap.guide import BootstrapGuide
 from cell.verbs.bootstrap.layout_uncertainty import LayoutUncertainty
 from cell.verbs.bootstrap.near_guard import JOINT_SPEED_DEG_S, SPEED_M_S, NearGuard
 from cell.verbs.bootstrap.probing import ProbingGuide
-from cell.verbs.bootstrap.standing import where_it_stands
+from cell.verbs.bootstrap.result_file import Found
+from cell.verbs.bootstrap.start_pose import start_joints_rad
 from cell.verbs.plan import design_plan
 
 _MOVED_THROUGH = (Finish.COMPLETED, Finish.COMPLETED_WITH_LOSSES)
@@ -118,7 +118,7 @@ class Bootstrap:
             Nothing was moved.
         """
         named = Guard(self.cell, SPEED_M_S, np.radians(JOINT_SPEED_DEG_S)).kinematics
-        start_rad = where_it_stands(devices, named)
+        start_rad = start_joints_rad(devices, named)
         guard = NearGuard.around(self.cell, start_rad, self.uncertainty)
         guard.check_surroundings()
         guide = self._guide(guard)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cell.storage.whole import write_whole
+from cell.storage.atomic import write_atomically
 from cell.verbs.compare.comparison import Comparison, Difference
 from cell.verbs.compare.messages import HEAD, TITLES, parts, table, verdict
 from cell.views.report import html
@@ -18,7 +18,7 @@ from cell.views.report.sections.drawing import drawing
 
 def write_page(path: Path, comparison: Comparison) -> None:
     """Write the page; raises `InputError` where the file cannot be written."""
-    write_whole(path, render(comparison))
+    write_atomically(path, render(comparison))
 
 
 def render(comparison: Comparison) -> str:

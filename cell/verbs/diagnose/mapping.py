@@ -44,7 +44,7 @@ def as_mapping(
         },
         "frames_used": [int(f) for f in found.views.frame],
         "frames_rejected": [vars(r) for r in found.rejected],
-        "notes": [*found.said, *notes],
+        "notes": [*found.notes, *notes],
     }
     return DiagnosisFile.model_validate(content).model_dump(mode="json", by_alias=True)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.chain.model import CellModel, predict
 from calib.views import Views
-from cell.storage.whole import whole_file
+from cell.storage.atomic import atomic_file
 
 BEFORE = "predicted_corners_before.csv"
 AFTER = "predicted_corners.csv"
@@ -18,7 +18,7 @@ AFTER = "predicted_corners.csv"
 def write_prediction(path: Path, model: CellModel, views: Views) -> None:
     """Write `frame,row,col,u_px,v_px` of every corner of every frame that has a pose."""
     pixels = predict(model, views)
-    with whole_file(path, newline="") as file:
+    with atomic_file(path, newline="") as file:
         rows = csv.writer(file)
         rows.writerow(["frame", "row", "col", "u_px", "v_px"])
         for frame, corners in zip(views.frame, pixels, strict=True):

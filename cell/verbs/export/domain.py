@@ -34,7 +34,7 @@ class Domain:
     share: float
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """For a warning and a file's comment."""
         return (
             f"its distortion folds {self.radius_px:.0f} px from the principal point"

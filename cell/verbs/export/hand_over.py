@@ -143,12 +143,12 @@ def _sayable(camera: Camera, tool: str, *, refit: bool) -> tuple[Camera, tuple[s
         from cell.verbs.export.refit import refit as fitted  # the solver takes a while to load
 
         found = fitted(camera, LENGTHS[tool])
-        camera = replace(found.camera, about=f"{camera.about}; {found.words}")
-        notes.append(found.words)
+        camera = replace(found.camera, about=f"{camera.about}; {found.description}")
+        notes.append(found.description)
     domain = domain_of(camera)
     if domain is not None:
-        camera = replace(camera, about=f"{camera.about}; {domain.words}")
-        notes.append(domain.words)
+        camera = replace(camera, about=f"{camera.about}; {domain.description}")
+        notes.append(domain.description)
     return camera, tuple(notes)
 
 

@@ -27,7 +27,7 @@ class Refit:
     worst_px: float
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """For a warning and a file's comment."""
         return (
             f"refitted with fewer coefficients: off the calibrated camera by {self.rms_px:.3g} px"

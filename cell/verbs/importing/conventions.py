@@ -38,7 +38,7 @@ _LEAST = 0.005
 
 
 @dataclass(frozen=True)
-class Said:
+class StatedConvention:
     """What the user said of the poses; None where nothing."""
 
     rotation: RotationName | None = None
@@ -46,7 +46,7 @@ class Said:
     inverted: bool | None = None
 
 
-NOTHING_SAID = Said()
+NOTHING_STATED = StatedConvention()
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class _Reading:
 
 def conclude(
     candidates: Sequence[Candidate],
-    said: Said = NOTHING_SAID,
+    stated: StatedConvention = NOTHING_STATED,
     check: PictureCheck | None = None,
     square_m: float | None = None,
 ) -> tuple[Candidate, Convention]:
@@ -144,25 +144,25 @@ def conclude(
     readings = [
         _Reading(candidate, rotation, inverted)
         for candidate in candidates
-        for rotation in ([said.rotation] if said.rotation else possible(candidate.poses))
-        for inverted in ([said.inverted] if said.inverted is not None else [False, True])
+        for rotation in ([stated.rotation] if stated.rotation else possible(candidate.poses))
+        for inverted in ([stated.inverted] if stated.inverted is not None else [False, True])
     ]
     measured = [] if check is None else [_measured(reading, check) for reading in readings]
     if any(reading.closure is not None for reading in measured):
-        best, notes, against = _by_pictures(measured, said)
+        best, notes, against = _by_pictures(measured, stated)
     else:
-        best, notes, against = _by_words(readings), (), ()
+        best, notes, against = _by_stated(readings), (), ()
         if check is not None:
             notes = ("the pictures could not be asked about the poses",)
-    lengths = _lengths(best, said, square_m)
+    lengths = _lengths(best, stated, square_m)
     guessed = [*best.candidate.notes, f"poses and pictures are paired {best.candidate.pairing.how}"]
-    if said.rotation is None:
+    if stated.rotation is None:
         guessed.append(f"rotations are {best.rotation} (say so with --rotation {best.rotation})")
-    if said.unit is None:
+    if stated.unit is None:
         guessed.append(
             f"positions are in {lengths.unit}, {lengths.why} (say so with --unit {lengths.unit})"
         )
-    if said.inverted is None:
+    if stated.inverted is None:
         name, option = _DIRECTION[best.inverted]
         guessed.append(f"poses are {name} (say so with {option})")
     return best.candidate, Convention(
@@ -213,7 +213,7 @@ def _measured(reading: _Reading, check: PictureCheck) -> _Reading:
     return _Reading(reading.candidate, reading.rotation, reading.inverted, closure)
 
 
-def _by_words(readings: Sequence[_Reading]) -> _Reading:
+def _by_stated(readings: Sequence[_Reading]) -> _Reading:
     """The reading that names and numbers alone decide."""
     first = readings[0]
     rotations = list(dict.fromkeys(reading.rotation for reading in readings))
@@ -230,7 +230,7 @@ def _by_words(readings: Sequence[_Reading]) -> _Reading:
 
 
 def _by_pictures(
-    measured: Sequence[_Reading], said: Said
+    measured: Sequence[_Reading], stated: StatedConvention
 ) -> tuple[_Reading, tuple[str, ...], tuple[str, ...]]:
     """The reading that the pictures bear out, what to tell of it, and what speaks against it."""
     order = sorted(range(len(measured)), key=lambda k: (measured[k].size, k))
@@ -239,7 +239,7 @@ def _by_pictures(
     best = measured[min(close)]
     if not measured[order[0]].good:
         best = measured[order[0]]
-        if said.rotation is not None:
+        if stated.rotation is not None:
             return best, (), (f"the poses as said agree with the pictures only to {best.off}",)
         raise InputError(_contradicted(best, [r.rotation for r in measured]))
     rivals = [measured[k] for k in close]
@@ -261,7 +261,7 @@ def _contradicted(best: _Reading, rotations: Sequence[RotationName]) -> str:
     )
 
 
-def _lengths(best: _Reading, said: Said, square_m: float | None) -> Lengths:
+def _lengths(best: _Reading, stated: StatedConvention, square_m: float | None) -> Lengths:
     try:
         values = [pose.values for pose in best.candidate.poses]
         places = read_matrices(values, best.rotation, inverted=False)[:, :3, 3]
@@ -270,7 +270,7 @@ def _lengths(best: _Reading, said: Said, square_m: float | None) -> Lengths:
             f"{best.candidate.poses[0].where}: is no pose as {best.rotation}: {fault}"
         ) from None
     factor = best.closure.length_factor if best.good and best.closure is not None else None
-    return unit_of(places, best.candidate.poses[0].unit, said.unit, factor, square_m)
+    return unit_of(places, best.candidate.poses[0].unit, stated.unit, factor, square_m)
 
 
 def ask(poses: Sequence[RawPose], readings: Sequence[RotationName]) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from calib.views import Mount
 from cell.verbs.importing import Take
-from cell.verbs.importing.conventions import Said
+from cell.verbs.importing.conventions import StatedConvention
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Described:
     board: dict[str, Any] | None = None
     poses: Path | None = None
     joints: Path | None = None
-    said: Said = field(default_factory=Said)
+    stated: StatedConvention = field(default_factory=StatedConvention)
     mount: Mount | None = None
     robot: str | None = None
     name: str | None = None

@@ -178,10 +178,10 @@ def _posed(
         candidates += [Candidate(each.poses, way, notes) for way in ways]
     mount: Mount = described.mount or "eye_in_hand"
     check = picture_check(len(pictures), corners, board, mount)
-    chosen, convention = conclude(candidates, described.said, check, board.square_m)
+    chosen, convention = conclude(candidates, described.stated, check, board.square_m)
     matrices = np.array([convention.transform(pose).as_matrix() for pose in chosen.poses])
     guessed = convention.guessed
-    if described.mount is None and described.said.inverted is None and check is not None:
+    if described.mount is None and described.stated.inverted is None and check is not None:
         guessed = (*guessed, _mount_or_direction(convention))
     return _Posed(
         apply(chosen.pairing, matrices),

@@ -33,7 +33,7 @@ class Lengths:
 def unit_of(
     places: FloatArray,
     named: Unit | None,
-    said: Unit | None,
+    stated: Unit | None,
     factor: float | None,
     square_m: float | None,
 ) -> Lengths:
@@ -41,7 +41,7 @@ def unit_of(
 
     Parameters
     ----------
-    named, said:
+    named, stated:
         By the names in the file, and by the user.
     factor:
         Units of the positions in a metre of the board, by the pictures; None where unknown.
@@ -57,8 +57,8 @@ def unit_of(
             " Flip the pictures left to right (or switch the camera's mirroring off) and import"
             " them again"
         )
-    if said is not None:
-        return Lengths(said, "as said", _against(said, factor, square_m))
+    if stated is not None:
+        return Lengths(stated, "as said", _against(stated, factor, square_m))
     farthest = float(np.abs(places).max())
     if factor is None:
         if named is not None:

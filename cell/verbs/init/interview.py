@@ -86,7 +86,7 @@ class Question:
     ----------
     key, option:
         Field of `Answers`, and the option that gives it.
-    words, usual:
+    prompt, usual:
         What is asked; the answer used where none is given, None where there is no safe one.
     read:
         From text to the field's value; raises `InputError`.
@@ -96,7 +96,7 @@ class Question:
 
     key: str
     option: str
-    words: str
+    prompt: str
     usual: str | None
     read: Callable[[str], Any] = str
     when: Callable[[Given], bool] = _always

@@ -34,7 +34,7 @@ class Requirements:
     by_hand: bool = False
 
     def size_for(self, cell: CellFile) -> PlanSize:
-        """How many views; raises `InputError` where the wishes contradict or cannot be met."""
+        """How many views; raises `InputError` where they contradict or cannot be met."""
         counts = (self.frames, self.parallel, self.varied)
         if self.alpha_sigma_px is not None:
             if self.by_hand or any(count is not None for count in counts):
@@ -59,7 +59,7 @@ class Requirements:
             self.by_hand,
         )
 
-    def as_words(self) -> list[str]:
+    def as_options(self) -> list[str]:
         """The options as they were given, seed always."""
         given = {
             "--frames": self.frames,

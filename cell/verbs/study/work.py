@@ -27,7 +27,7 @@ def work(study: Study, task: Task) -> Row:
     try:
         row |= kind_of(study).work(study, task)
     except Exception as error:
-        row |= {"status": FAILED, "reason": _words(error)}
+        row |= {"status": FAILED, "reason": _reason(error)}
     row["cpu_s"] = time.process_time() - begun
     row["worker"] = f"{socket.gethostname()}:{os.getpid()}"
     return row
@@ -43,7 +43,7 @@ def _head(task: Task, status: str, reason: str | None) -> Row:
     return head | task.asked()
 
 
-def _words(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     """What an error says; where one that nobody foresaw was raised, too."""
     if isinstance(error, CalibrationError) or exit_status_of(error) is not None:
         return str(error)

@@ -129,10 +129,10 @@ def _alpha(alpha: tuple[AlphaPart, ...]) -> str:
 
 
 def _length(found: VerifyFile) -> str:
-    return "" if found.length is None else f" {length_words(found.length)}"
+    return "" if found.length is None else f" {length_text(found.length)}"
 
 
-def length_words(length: LengthPart) -> str:
+def length_text(length: LengthPart) -> str:
     """The known length and its error."""
     ends = " and ".join(f"({row}, {col})" for row, col in length.corners)
     return (
@@ -214,7 +214,7 @@ def text(found: VerifyFile) -> str:
             " exceed once in a hundred times; mm: across the axis.",
         ]
     if found.length is not None and found.verdict not in _LENGTH_SAID:
-        lines.append(length_words(found.length))
+        lines.append(length_text(found.length))
     lines += [f"frame {f.frame} left out: {f.reason}" for f in found.frames_left_out]
     lines += [f"note: {note}" for note in found.notes]
     return "\n".join(lines)

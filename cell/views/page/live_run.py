@@ -104,22 +104,22 @@ class LiveRun(Watcher):
                 self._set("coverage", self._coverage.content())
         self._set("estimate", estimate_part(estimate, self._history, self._plan.file.until))
 
-    def say(self, words: str) -> None:
+    def say(self, text: str) -> None:
         """A line for the operator."""
-        self._messages.add(words)
+        self._messages.add(text)
         self._set("messages", {"lines": self._messages.lines()})
 
     def recorded(self, result: RunResult) -> None:
         """How the recording ended; the evaluation may follow."""
         self.over = True
-        words = result.finish.words
-        self._set("end", {"words": words, "reason": result.reason or result.ended_early})
+        text = result.finish.text
+        self._set("end", {"words": text, "reason": result.reason or result.ended_early})
 
-    def ended(self, words: str, files: Mapping[str, str]) -> None:
+    def ended(self, text: str, files: Mapping[str, str]) -> None:
         """The program's last words, and the files it wrote, by what they are."""
         self.over = True
-        ended = dict(self.parts["end"].content) if "end" in self.parts else {"words": words}
-        self._set("end", ended | {"result": words, "files": dict(files), "final": True})
+        ended = dict(self.parts["end"].content) if "end" in self.parts else {"words": text}
+        self._set("end", ended | {"result": text, "files": dict(files), "final": True})
 
     # -- the page's side -------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cell.views.answer_words import SIGMAS, dominant
+from cell.views.answer_text import SIGMAS, dominant
 from cell.views.report.data import ReportData
 from cell.views.report.workpiece_error import WorkpieceError, of_solution
 

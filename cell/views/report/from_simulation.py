@@ -21,10 +21,10 @@ def simulation_truth(model: CellModel, views: Views) -> Truth:
         board_from_camera=inverse(state.camera_from_board) if lopsided else None,
         alpha_px=state.column("alpha_px"),
         beta_px=state.column("beta_px"),
-        effects=tuple(_words(present.effect) for present in model.effects),
+        effects=tuple(_label(present.effect) for present in model.effects),
     )
 
 
-def _words(effect: Effect) -> str:
+def _label(effect: Effect) -> str:
     name = effect.name if effect.law is None else f"{effect.name} ({effect.law})"
     return name.replace("_", " ")

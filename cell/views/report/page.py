@@ -5,25 +5,25 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
-from cell.storage.whole import write_whole
+from cell.storage.atomic import write_atomically
 from cell.views.report import html
 from cell.views.report.data import ReportData
 from cell.views.report.sections.answer import answer
 from cell.views.report.sections.chain import chain
 from cell.views.report.sections.coverage import coverage
 from cell.views.report.sections.detector import detector
-from cell.views.report.sections.findings import story
+from cell.views.report.sections.findings import diagnosis_section
 from cell.views.report.sections.frames import frames
 from cell.views.report.sections.lens import lens
-from cell.views.report.sections.made import made
 from cell.views.report.sections.poses import poses
+from cell.views.report.sections.provenance import made
 from cell.views.report.sections.tables import tables
 from cell.views.report.sections.uncertainty import uncertainty
 
 _SECTIONS = (
     answer,
     chain,
-    story,
+    diagnosis_section,
     poses,
     lens,
     uncertainty,
@@ -76,4 +76,4 @@ def write_report(path: Path, data: ReportData) -> None:
     InputError
         Where the file cannot be written.
     """
-    write_whole(path, render(data))
+    write_atomically(path, render(data))

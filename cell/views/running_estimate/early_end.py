@@ -37,7 +37,7 @@ class EarlyEnd:
             self._before = estimate
         elif estimate.frames > self._before.frames:
             if self._steady(self._before, estimate):
-                self._reason = self._words(estimate)
+                self._reason = self._explained(estimate)
             self._before = estimate
 
     def catch_up(self) -> None:
@@ -64,7 +64,7 @@ class EarlyEnd:
         at_same = np.interp(now.distance_m, before.distance_m, before.alpha_px)
         return float(np.abs(now.alpha_px - at_same).max()) <= self._until.alpha_sigma_px
 
-    def _words(self, estimate: Estimate) -> str:
+    def _explained(self, estimate: Estimate) -> str:
         near, far = estimate.distance_m[[0, -1]]
         return (
             f"alpha is known to {estimate.worst_sigma_px:.2g} px from {near:.2f} to {far:.2f} m"

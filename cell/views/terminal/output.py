@@ -11,7 +11,7 @@ from typing import Any
 
 from cell.errors import InputError
 
-_kept = logging.getLogger("cell.said")
+_kept = logging.getLogger("cell.output")
 """What the operator was told; it goes to the log file alone, stderr has it already."""
 
 _kept.propagate = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from cell.views.answer_words import answer_words
+from cell.views.answer_text import answer_text
 
 _NAMES = {
     "zhang_algebraic": "Zhang, algebraic",
@@ -40,7 +40,7 @@ def calibration_summary(calibration: Mapping[str, Any], *, answer: bool = True) 
 
 def answer_line(calibration: Mapping[str, Any]) -> str:
     """For which distances the camera may be used, with what error."""
-    return f"answer: {answer_words(calibration.get('answer'))}"
+    return f"answer: {answer_text(calibration.get('answer'))}"
 
 
 def warning_lines(calibration: Mapping[str, Any]) -> list[str]:
@@ -51,7 +51,7 @@ def warning_lines(calibration: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def undetermined_words(calibration: Mapping[str, Any]) -> str | None:
+def undetermined_text(calibration: Mapping[str, Any]) -> str | None:
     """What the data do not determine, or None."""
     names = {"camera": "the camera", "hand_eye": "the camera's place on the robot"}
     parts = [names[part] for part in calibration.get("undetermined") or ()]

@@ -56,8 +56,8 @@ def test_https_is_spoken_where_the_controller_has_it_and_its_certificate_is_trus
 
 def test_a_certificate_that_nobody_compared_is_refused_with_its_fingerprint():
     with controller(https=True) as peer:
-        said = refusal(f"{peer.address}:{peer.port}", ABBSettings(login=FACTORY_LOGIN))
-        assert f"certificate_sha256: {certificate_of(peer.address, peer.port)}" in said
+        output = refusal(f"{peer.address}:{peer.port}", ABBSettings(login=FACTORY_LOGIN))
+        assert f"certificate_sha256: {certificate_of(peer.address, peer.port)}" in output
         assert not peer.request_times_s
 
 
@@ -91,9 +91,9 @@ def test_nothing_is_sent_without_a_login():
 
 
 def test_a_password_in_the_address_is_refused_and_not_repeated():
-    said = refusal(f"http://admin:{SECRET}@10.0.0.1", ABBSettings(login=FACTORY_LOGIN))
-    assert "no user name or password" in said
-    assert SECRET not in said
+    output = refusal(f"http://admin:{SECRET}@10.0.0.1", ABBSettings(login=FACTORY_LOGIN))
+    assert "no user name or password" in output
+    assert SECRET not in output
 
 
 def test_the_password_is_in_no_message_no_log_and_no_reading(caplog):

@@ -246,9 +246,9 @@ def test_nothing_moves_before_it_is_connected(bench):
 def test_a_driver_says_once_that_it_was_not_tried_on_the_real_machine(bench, caplog):
     from drivers import untried
 
-    untried._said.clear()
+    untried._warned.clear()
     bench.arm.connect()
     bench.arm.close()
     bench.arm.connect()
-    said = [record for record in caplog.records if "never on the real machine" in record.message]
-    assert len(said) == (1 if bench.watched else 0)
+    output = [record for record in caplog.records if "never on the real machine" in record.message]
+    assert len(output) == (1 if bench.watched else 0)

@@ -153,8 +153,8 @@ def test_another_web_server_is_no_robot_api(body):
 
 
 def test_a_refusal_in_the_controllers_words_is_one_short_line():
-    said = json.dumps({"message": "no\x1b[2J" + "a" * 5000, "details": "because"}).encode()
-    address, server = answering(said, b"409 Conflict")
+    output = json.dumps({"message": "no\x1b[2J" + "a" * 5000, "details": "because"}).encode()
+    address, server = answering(output, b"409 Conflict")
     try:
         refusal = RobotApi(address, ROBOT_API_PORT).unlock_protective_stop()
         assert refusal.isprintable()

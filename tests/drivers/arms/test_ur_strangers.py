@@ -88,8 +88,8 @@ def test_a_recipe_that_cannot_be_is_refused_by_name(types, words):
         link.recv(4096)
 
     with answering(RTDE_PORT, serve) as address:
-        _, said = takes_s(lambda: RtdeReader(address).connect(1.0), DeviceError)
-    assert words in said
+        _, output = takes_s(lambda: RtdeReader(address).connect(1.0), DeviceError)
+    assert words in output
 
 
 @pytest.mark.parametrize(
@@ -121,10 +121,10 @@ def test_values_that_cannot_be_are_refused_by_name_and_stop_the_arm(name, value,
 )
 def test_the_dashboard_is_waited_for_no_longer_than_was_meant(data, words):
     with answering(DASHBOARD_PORT, again_and_again(data, 0.002)) as address:
-        duration_s, said = takes_s(lambda: Dashboard(address).ask("stop", 0.4), DeviceUnreachable)
+        duration_s, output = takes_s(lambda: Dashboard(address).ask("stop", 0.4), DeviceUnreachable)
     assert duration_s < 1.2
-    assert words in said
-    assert "xxx" not in said
+    assert words in output
+    assert "xxx" not in output
 
 
 def test_a_line_that_nobody_asked_for_is_no_answer():
@@ -147,9 +147,9 @@ def test_a_dashboards_control_characters_and_length_end_at_the_driver():
         link.sendall(b"\x1b[2Jred\x00\xff" + b"a" * 3000 + b"\n")
 
     with answering(DASHBOARD_PORT, serve) as address:
-        said = Dashboard(address).ask("robotmode", 1.0)
-    assert said.isprintable()
-    assert len(said) < 200
+        output = Dashboard(address).ask("robotmode", 1.0)
+    assert output.isprintable()
+    assert len(output) < 200
 
 
 def test_a_stop_does_not_wait_for_a_dashboard_that_never_ends():
@@ -176,8 +176,8 @@ def kinematics(*values):
 def test_kinematics_that_are_not_finite_are_refused_by_name():
     data = kinematics(*[0.1] * 23, math.nan)
     with answering(PRIMARY_PORT, again_and_again(data)) as address:
-        _, said = takes_s(lambda: read_kinematics(address), DeviceError)
-    assert "not finite" in said
+        _, output = takes_s(lambda: read_kinematics(address), DeviceError)
+    assert "not finite" in output
 
 
 @pytest.mark.parametrize("data", [b"\x00", package(20, b"hello"), package(16, b"")])

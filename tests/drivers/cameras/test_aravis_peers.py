@@ -104,18 +104,18 @@ def peer(scene: Scene) -> Iterator[GigEPeer]:
         yield made
 
 
-def said(*command: str) -> str:
+def output(*command: str) -> str:
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def test_arv_tool_reads_names_and_features_and_writes_some(peer: GigEPeer) -> None:
-    listed = said(TOOL, "-a", peer.address, "features")
+    listed = output(TOOL, "-a", peer.address, "features")
     for name in ("DeviceVendorName", "ExposureTime", "TriggerSoftware", "FocusStepper"):
         assert f"'{name}'" in listed
     names = ("DeviceVendorName", "DeviceModelName", "DeviceSerialNumber", "DeviceVersion")
-    reported = said(
+    reported = output(
         TOOL, "-a", peer.address, "control", *names, "ExposureTime=2500", "ExposureTime"
     )
     assert "DeviceVendorName = CalibrationCell" in reported
@@ -127,7 +127,7 @@ def test_arv_tool_reads_names_and_features_and_writes_some(peer: GigEPeer) -> No
 
 @pytest.mark.parametrize("trigger", [(), ("-o", "5")], ids=["free running", "triggered"])
 def test_arv_camera_test_streams_without_a_loss(peer: GigEPeer, trigger: tuple[str, ...]) -> None:
-    reported = said(CLIENT, "-n", peer.address, "--duration=3", "-e", "5000", "-g", "3", *trigger)
+    reported = output(CLIENT, "-n", peer.address, "--duration=3", "-e", "5000", "-g", "3", *trigger)
     assert "vendor name            = CalibrationCell" in reported
     counts = {name: int(count) for name, count in re.findall(r"(n_\w+) += (\d+)", reported)}
     assert counts["n_completed_buffers"] >= 5

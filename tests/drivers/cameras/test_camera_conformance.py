@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.camera import FocusSetting
-from drivers.errors import DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceRefused, DeviceUnreachable, FrameMissing
 from tests.drivers.cameras.rigs import RIGS, Rig
 
 TIMEOUT_S = 5.0
@@ -113,7 +113,7 @@ def test_a_late_frame_is_lost_in_time_and_never_taken_for_the_next(rig: Rig) -> 
     if rig.delay:
         rig.delay(1.0)
     begun_s = time.monotonic()
-    with pytest.raises((FrameLost, DeviceUnreachable)):
+    with pytest.raises((FrameMissing, DeviceUnreachable)):
         rig.camera.grab(too_short_s)
     assert time.monotonic() - begun_s < too_short_s + SLACK_S
     if rig.delay:

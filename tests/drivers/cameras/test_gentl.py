@@ -58,8 +58,8 @@ def test_no_producer_on_the_search_path_is_said(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_several_cameras_and_no_choice_lists_them() -> None:
-    said = refusal(GenTLCamera(VIKY))
-    assert all(f"serial_number {number}" in said for number in range(3))
+    output = refusal(GenTLCamera(VIKY))
+    assert all(f"serial_number {number}" in output for number in range(3))
 
 
 def test_a_camera_without_a_trigger_says_what_to_write() -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from drivers.aravis import AravisCamera
 from drivers.camera import FocusSetting
-from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameMissing
 from drivers.genicam_camera import GenICamOptions
 from sim.peers.callable_camera import CallableCamera
 from sim.peers.gige import GigEPeer
@@ -124,7 +124,7 @@ def test_a_swallowed_trigger_is_a_lost_frame_and_the_next_one_comes(
     camera: AravisCamera, peer: GigEPeer, scene: Scene
 ) -> None:
     peer.faults.skip_frames = 1
-    with pytest.raises(FrameLost, match="no frame came"):
+    with pytest.raises(FrameMissing, match="no frame came"):
         camera.grab(0.6)
     assert frames_right(camera, scene, 3) == [True] * 3
 
@@ -144,7 +144,7 @@ def test_packets_too_long_for_the_network_are_named(peer: GigEPeer) -> None:
     peer.faults.largest_packet_bytes = 1500
     camera = AravisCamera(peer.address)
     camera.connect()
-    with pytest.raises(FrameLost, match="MTU"):
+    with pytest.raises(FrameMissing, match="MTU"):
         camera.grab(0.6)
     camera.close()
     fitting = AravisCamera(peer.address, packet_bytes=1500)
@@ -301,8 +301,8 @@ def test_the_driver_says_that_it_was_never_tried_on_a_real_camera(
     for _ in range(2):
         camera.connect()
     camera.close()
-    said = [r for r in caplog.records if "never on the real machine" in r.message]
-    assert len(said) == 1
+    output = [r for r in caplog.records if "never on the real machine" in r.message]
+    assert len(output) == 1
 
 
 def test_without_pygobject_the_packages_are_named(monkeypatch: pytest.MonkeyPatch) -> None:

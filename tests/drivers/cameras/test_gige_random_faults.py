@@ -10,7 +10,7 @@ from collections.abc import Callable
 import pytest
 
 from drivers.aravis import AravisCamera
-from drivers.errors import DeviceUnreachable, FrameLost
+from drivers.errors import DeviceUnreachable, FrameMissing
 from drivers.genicam_camera import GenICamOptions
 from sim.peers.callable_camera import CallableCamera
 from sim.peers.gige import GigEPeer
@@ -75,7 +75,7 @@ def test_faults_at_random_instants_cost_time_and_never_a_wrong_frame() -> None:
                 shown = number_in(camera.grab(TIMEOUT_S).image)
                 right, wrong = right + (shown == scene.number), wrong + (shown != scene.number)
                 lost = False
-            except (FrameLost, DeviceUnreachable) as error:
+            except (FrameMissing, DeviceUnreachable) as error:
                 faults_seen, lost = faults_seen + 1, isinstance(error, DeviceUnreachable)
             longest_s = max(longest_s, time.monotonic() - begun_s)
             if lost:

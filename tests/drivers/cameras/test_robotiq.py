@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from drivers.camera import FocusSetting
-from drivers.errors import DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceRefused, DeviceUnreachable, FrameMissing
 from drivers.robotiq import RobotiqCamera
 from sim.peers.callable_camera import CallableCamera
 from sim.peers.robotiq import RobotiqPeer
@@ -61,7 +61,7 @@ def test_a_picture_that_repeats_is_never_taken_for_a_new_one(
 ) -> None:
     camera.grab(5.0)
     peer.faults.frozen = True
-    with pytest.raises(FrameLost, match="repeats"):
+    with pytest.raises(FrameMissing, match="repeats"):
         camera.grab(0.5)
 
 
@@ -75,7 +75,7 @@ def test_a_picture_cut_short_is_taken_again(
 
 def test_only_cut_pictures_are_a_lost_frame(camera: RobotiqCamera, peer: RobotiqPeer) -> None:
     peer.faults.cut_short = 10**6
-    with pytest.raises(FrameLost, match="no whole JPEG"):
+    with pytest.raises(FrameMissing, match="no whole JPEG"):
         camera.grab(0.5)
 
 

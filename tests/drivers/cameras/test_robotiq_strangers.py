@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameLost
+from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameMissing
 from drivers.jpeg import jpeg_size
 from drivers.robotiq import RobotiqCamera
 from drivers.robotiq_http import MOST_PIXELS, RobotiqHttp
@@ -66,10 +66,10 @@ def test_what_a_server_sends_reaches_no_message(answer: bytes) -> None:
         for ask in (http.picture, lambda end: http.change({}, end)):
             with pytest.raises(DeviceError) as raised:
                 ask(soon())
-            said = str(raised.value)
-            assert "raw-bytes" not in said
-            assert said.isprintable()
-            assert len(said) < 300
+            output = str(raised.value)
+            assert "raw-bytes" not in output
+            assert output.isprintable()
+            assert len(output) < 300
 
 
 def jpeg_that_says(width: int, height: int) -> bytes:
@@ -163,5 +163,5 @@ def test_no_bytes_make_the_size_raise(data: bytes) -> None:
 
 def test_a_picture_of_no_size_is_no_picture() -> None:
     assert MOST_PIXELS >= 4096 * 4096
-    with answering(lambda _: reply(b"\xff\xd8\xff\xd9")) as http, pytest.raises(FrameLost):
+    with answering(lambda _: reply(b"\xff\xd8\xff\xd9")) as http, pytest.raises(FrameMissing):
         http.picture(soon())

@@ -51,4 +51,4 @@ def test_a_fault_leaves_the_arm_standing_the_recording_whole_and_the_operator_to
     with STANDS[stand](tmp_path) as devices:
         came = happening(devices, tmp_path / "run", fault, instant_s)
     assert came is not None, "this machine is too busy: watchdogs ended the runs before the fault"
-    assert not came.complaints, came.said
+    assert not came.complaints, came.output

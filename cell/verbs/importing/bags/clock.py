@@ -85,13 +85,13 @@ def _polished(misfit: Callable[[float], FloatArray], start_s: float) -> ClockOff
         slope = (misfit(tau + _SLOPE_S) - misfit(tau - _SLOPE_S)) / (2 * _SLOPE_S)
         scale = 1.4826 * float(np.median(np.abs(r))) + 1e-9
         weight = np.minimum(1.0, 1.5 * scale / np.maximum(np.abs(r), 1e-12))
-        told = float((weight * slope**2).sum())
-        if told <= 0.0:
+        reported = float((weight * slope**2).sum())
+        if reported <= 0.0:
             return None
-        step = -float((weight * slope * r).sum()) / told
+        step = -float((weight * slope * r).sum()) / reported
         tau += float(np.clip(step, -_STEP_S, _STEP_S))
     # every picture takes part in up to four pairs, whose errors go together
-    sigma = 2.0 * scale / np.sqrt(told)
+    sigma = 2.0 * scale / np.sqrt(reported)
     if sigma > _TELLING_S or abs(tau) > _SPAN_S:
         return None
     return ClockOffset(tau, sigma)

@@ -69,11 +69,11 @@ def import_bag(
             "the board is not said: give --board ROWSxCOLSxSQUARE in inner corners and metres, such"
             " as --board 6x9x0.025"
         )
-    said = described.bag
+    stated = described.bag
     with open_bag(source) as bag:
-        image = image_topic(bag, said.image)
-        contents = read_contents(bag, image, joint_topic(bag, said.joints))
-        robot = find_robot(contents, described.robot, said.base, said.flange)
+        image = image_topic(bag, stated.image)
+        contents = read_contents(bag, image, joint_topic(bag, stated.joints))
+        robot = find_robot(contents, described.robot, stated.base, stated.flange)
         header = _header(source, described, contents, robot, _size(bag, contents))
         plan = _plan(bag, contents, robot, described, header.board.board())
         header = _told(header, robot, plan)
@@ -118,7 +118,7 @@ def _plan(bag: Bag, contents: Contents, robot: Robot, described: Described, boar
     if not robot.has_poses:
         some = order[np.unique(np.linspace(0, len(order) - 1, _MOST_WITHOUT_POSES).astype(int))]
         return _Plan(some, times, False, 0.0, (*notes, no_poses(robot, contents)))
-    offset_s, told = _offset(bag, contents, robot, described, board, order)
+    offset_s, reported = _offset(bag, contents, robot, described, board, order)
     bound = TIME_BOUND_S if described.time_bound_s is None else described.time_bound_s
     at = times + offset_s
     away = robot.away_s(at)
@@ -134,7 +134,7 @@ def _plan(bag: Bag, contents: Contents, robot: Robot, described: Described, boar
     if not len(chosen):
         raise InputError(f"{bag.path}: the arm never stands still; say --take moving")
     taken = order[chosen]
-    notes += [told, why, _bound_words(away[taken], bound, int((~usable).sum()))]
+    notes += [reported, why, _bound_words(away[taken], bound, int((~usable).sum()))]
     return _Plan(taken, at, moving, offset_s, tuple(notes))
 
 
@@ -156,7 +156,7 @@ def _offset(
     order: NDArray[np.int64],
 ) -> tuple[float, str]:
     """Seconds to add to the pictures' stamps, and what to say of it."""
-    said = described.bag.clock_offset_s
+    stated = described.bag.clock_offset_s
     found = _estimated(bag, contents, robot, board, order)
     if found is None:
         words = "the pictures do not tell by how much the camera's clock is off from the joints'"
@@ -166,8 +166,8 @@ def _offset(
             f"the camera's clock is {1e3 * abs(found.offset_s):.1f} ± {1e3 * found.sigma_s:.1f} ms"
             f" {late} against the joints'"
         )
-    if said is not None:
-        return said, f"{words}; {1e3 * said:.1f} ms are added as said (--clock-offset)"
+    if stated is not None:
+        return stated, f"{words}; {1e3 * stated:.1f} ms are added as said (--clock-offset)"
     if found is None or not found.sure:
         return 0.0, f"{words}; nothing is added"
     return found.offset_s, f"{words}; made good (--clock-offset 0 leaves it)"
@@ -202,11 +202,11 @@ def _header(
     size_px: tuple[int, int],
 ) -> Header:
     info = contents.camera_info
-    said: dict[str, Any] = {"from": str(source), "image_topic": contents.image.name}
-    said["start_ns"] = contents.start_ns
+    stated: dict[str, Any] = {"from": str(source), "image_topic": contents.image.name}
+    stated["start_ns"] = contents.start_ns
     if info is not None:
         k, d = (getattr(info, n, getattr(info, n.upper(), ())) for n in ("k", "d"))
-        said["camera_info"] = {
+        stated["camera_info"] = {
             "distortion_model": str(info.distortion_model),
             "k": [float(v) for v in k],
             "d": [float(v) for v in d],
@@ -219,7 +219,7 @@ def _header(
         "board": described.board,
         "mount": described.mount or "eye_in_hand",
         "images": "images/",
-        "imported": said,
+        "imported": stated,
     }
     return Header.model_validate(data)
 
@@ -291,7 +291,7 @@ def _held_against_pictures(found: Imported, robot: Robot, recording: Any) -> Imp
         f" to {1e2 * closure.place_share:.1f} % of the way"
     )
     if closure.angle_rad <= _GOOD_RAD and closure.place_share <= _GOOD_SHARE:
-        said = f"the pictures bear the poses out: {words}"
-        return replace(found, guessed=(*found.guessed, said))
+        stated = f"the pictures bear the poses out: {words}"
+        return replace(found, guessed=(*found.guessed, stated))
     against = f"the poses taken agree with the pictures only so: {words}. Check --base, --flange,"
     return replace(found, contradicted=(f"{against} --mount and --clock-offset",))

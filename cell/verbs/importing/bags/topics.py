@@ -17,11 +17,11 @@ _NO_PICTURE = re.compile(r"depth|disparity|infra|theora|ffmpeg|/ir(?:/|_|$)", re
 _SHOWN = 30
 
 
-def image_topic(bag: Bag, said: str | None) -> Topic:
+def image_topic(bag: Bag, stated: str | None) -> Topic:
     """The topic of the pictures; raises `InputError` with the list where several can be meant."""
     able = _of(bag, IMAGE, COMPRESSED)
-    if said is not None:
-        return _said(bag, said, able, "--image-topic")
+    if stated is not None:
+        return _said(bag, stated, able, "--image-topic")
     likely = [topic for topic in able if not _NO_PICTURE.search(topic.name)] or able
     # the same pictures, once as they are and once compressed
     raw = {topic.name for topic in likely if topic.type == IMAGE}
@@ -37,11 +37,11 @@ def image_topic(bag: Bag, said: str | None) -> Topic:
     )
 
 
-def joint_topic(bag: Bag, said: str | None) -> Topic | None:
+def joint_topic(bag: Bag, stated: str | None) -> Topic | None:
     """The topic of the joints, None where there is none; raises `InputError` for several."""
     able = _of(bag, JOINTS)
-    if said is not None:
-        return _said(bag, said, able, "--joint-topic")
+    if stated is not None:
+        return _said(bag, stated, able, "--joint-topic")
     usual = [topic for topic in able if topic.name == "/joint_states"]
     if usual or len(able) <= 1:
         return next(iter(usual or able), None)
@@ -76,11 +76,11 @@ def _of(bag: Bag, *types: str) -> list[Topic]:
     return [topic for topic in bag.topics.values() if topic.type in types]
 
 
-def _said(bag: Bag, said: str, able: Sequence[Topic], option: str) -> Topic:
-    found = [topic for topic in able if topic.name == said]
+def _said(bag: Bag, stated: str, able: Sequence[Topic], option: str) -> Topic:
+    found = [topic for topic in able if topic.name == stated]
     if found:
         return found[0]
-    raise InputError(f"{option} {said}: is no such topic of {bag.path}; it has {_list(able)}")
+    raise InputError(f"{option} {stated}: is no such topic of {bag.path}; it has {_list(able)}")
 
 
 def _list(topics: Iterable[Topic]) -> str:

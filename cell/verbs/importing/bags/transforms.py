@@ -113,10 +113,10 @@ def way_between(found: Transforms, base: str | None, flange: str | None) -> Way 
         A frame that is named is not there, or no transforms lead from one to the other.
     """
     names = found.frames
-    for option, said in (("--base", base), ("--flange", flange)):
-        if said is not None and names and said not in names:
+    for option, stated in (("--base", base), ("--flange", flange)):
+        if stated is not None and names and stated not in names:
             shown = ", ".join(names[:_SHOWN])
-            raise InputError(f"{option} {said}: is no frame of the bag's transforms: {shown}")
+            raise InputError(f"{option} {stated}: is no frame of the bag's transforms: {shown}")
     starts = [base] if base else [name for name in _BASES if name in names]
     ends = [flange] if flange else [name for name in _FLANGES if name in names]
     for start in starts:

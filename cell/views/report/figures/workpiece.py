@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cell.views.answer_words import SIGMAS
+from cell.views.answer_text import SIGMAS
 from cell.views.numbers import solution_name
 from cell.views.report.answer_values import answer_of, shared_by_distance
 from cell.views.report.data import ReportData

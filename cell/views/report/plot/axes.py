@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from calib.views import FloatArray
 from cell.views.report.plot.colours import colours
-from cell.views.report.plot.marks import Arrows, Mark, Series, Squares, Tiles, Words
+from cell.views.report.plot.marks import Arrows, Mark, Series, Squares, TextMark, Tiles
 from cell.views.report.plot.place import Place, Scale, scale_of
-from cell.views.report.plot.text import SIZE, width_of, words_at
+from cell.views.report.plot.text import SIZE, text_at, width_of
 
 _GRID, _EDGE = "#e3e6ea", "#5b616b"
 _POINTS_PER_TICK = (42.0, 28.0)
@@ -42,7 +42,7 @@ class Axes:
         self.marks: list[Mark] = []
         self.grid = [True, True]
         self.log_y = False
-        self.tick_words: tuple[list[float], list[str]] | None = None
+        self.tick_labels: tuple[list[float], list[str]] | None = None
         self.legend_at: Literal["upper left", "lower right"] | None = None
         self._limits: list[Limits | None] = [None, None]
         self._aspect: Literal["free", "box", "limits"] = "free"
@@ -67,9 +67,9 @@ class Axes:
         `aspect` makes a unit of x and of y as long, by a smaller box or by wider limits; `down`
         lets y grow downwards.
         """
-        for name, words in (("title", title), ("xlabel", xlabel), ("ylabel", ylabel)):
-            if words is not None:
-                setattr(self, name, words)
+        for name, labels in (("title", title), ("xlabel", xlabel), ("ylabel", ylabel)):
+            if labels is not None:
+                setattr(self, name, labels)
         for axis, limits in enumerate((xlim, ylim)):
             if limits is not None:
                 self._limits[axis] = limits
@@ -135,8 +135,8 @@ class Axes:
         zero = np.zeros(len(at))
         self.marks.append(Tiles(zero, ends, at - 0.3, at + 0.3, colors, zorder=2.0))
         for y, value in zip(at, values, strict=True):
-            self.marks.append(Words(value, float(y), fmt % value, right=4.0, up=-3.0))
-        self.tick_words = at.tolist(), list(names)
+            self.marks.append(TextMark(value, float(y), fmt % value, right=4.0, up=-3.0))
+        self.tick_labels = at.tolist(), list(names)
         self.grid[1] = False
 
     def image(self, values: FloatArray, x: Limits, y: Limits, *, colormap: str, limits: Limits,
@@ -183,9 +183,9 @@ class Axes:
         if key:
             self._key = drawn, key
 
-    def annotate(self, words: str, x: float, y: float, **look: Any) -> None:
-        """Words at a point; `look` as `Words` has it."""
-        self.marks.append(Words(x, y, words, **look))
+    def annotate(self, labels: str, x: float, y: float, **look: Any) -> None:
+        """Words at a point; `look` as `TextMark` has it."""
+        self.marks.append(TextMark(x, y, labels, **look))
 
     # what follows is for the figure: limits, margins, and the SVG text
 
@@ -218,33 +218,33 @@ class Axes:
 
     def ticks(self, axis: int, scale: Scale, points: float) -> tuple[list[float], list[str]]:
         """Where ticks are, and what is written there."""
-        if axis == 1 and self.tick_words is not None:
-            return self.tick_words
+        if axis == 1 and self.tick_labels is not None:
+            return self.tick_labels
         at = scale.ticks(points / _POINTS_PER_TICK[axis])
-        return at, scale.words(at)
+        return at, scale.labels(at)
 
-    def margins(self, y_words: list[str]) -> tuple[float, float, float, float]:
+    def margins(self, y_labels: list[str]) -> tuple[float, float, float, float]:
         """Room needed left, right, above and below the box, points."""
-        left = max(map(width_of, y_words), default=0.0) + 8.0 + (15.0 if self.ylabel else 0.0)
+        left = max(map(width_of, y_labels), default=0.0) + 8.0 + (15.0 if self.ylabel else 0.0)
         right = 10.0 if self._bar is None else _BAR
         above = 18.0 if self.title or self._key else 8.0
         return left, right, above, 16.0 + (15.0 if self.xlabel else 0.0)
 
-    def svg(self, place: Place, left: float, top: float, words: tuple[bool, bool]) -> str:
-        """All of it, the box's top left corner at (left, top); `words`: whether ticks have any."""
+    def svg(self, place: Place, left: float, top: float, labels: tuple[bool, bool]) -> str:
+        """All of it, the box's top left corner at (left, top); `labels`: whether ticks have any."""
         ticks = [self.ticks(0, place.x, place.width), self.ticks(1, place.y, place.height)]
         inside = "".join(m.svg(place) for m in sorted(self.marks, key=lambda m: m.zorder))
         parts = [
-            self._frame(place, ticks, words),
+            self._frame(place, ticks, labels),
             f'<svg width="{place.width:.1f}" height="{place.height:.1f}">{inside}</svg>',
-            self._titles(place, ticks[1][1] if words[1] else []),
+            self._titles(place, ticks[1][1] if labels[1] else []),
             self._colour_bar(place),
             self._arrow_key(place),
         ]
         return f'<g transform="translate({left:.1f} {top:.1f})">{"".join(parts)}</g>'
 
     def _frame(
-        self, place: Place, ticks: list[tuple[list[float], list[str]]], words: tuple[bool, bool]
+        self, place: Place, ticks: list[tuple[list[float], list[str]]], labels: tuple[bool, bool]
     ) -> str:
         across = place.at(ticks[0][0], np.full(len(ticks[0][0]), np.nan))[0].tolist()
         down = place.at(np.full(len(ticks[1][0]), np.nan), ticks[1][0])[1].tolist()
@@ -254,24 +254,24 @@ class Axes:
         edge = f"M0 0v{height:.1f}h{width:.1f}"
         edge += "".join(f"M{x:.1f} {height:.1f}v3.5" for x in across)
         edge += "".join(f"M0 {y:.1f}h-3.5" for y in down)
-        below = zip(across, ticks[0][1], strict=True) if words[0] else ()
-        beside = zip(down, ticks[1][1], strict=True) if words[1] else ()
+        below = zip(across, ticks[0][1], strict=True) if labels[0] else ()
+        beside = zip(down, ticks[1][1], strict=True) if labels[1] else ()
         return (
             (f'<path d="{grid}" stroke="{_GRID}" stroke-width="0.8"/>' if grid else "")
             + f'<path d="{edge}" fill="none" stroke="{_EDGE}" stroke-width="0.8"/>'
-            + "".join(words_at(x, height + 14.0, word, anchor="middle") for x, word in below)
-            + "".join(words_at(-6.0, y + 3.5, word, anchor="end") for y, word in beside)
+            + "".join(text_at(x, height + 14.0, word, anchor="middle") for x, word in below)
+            + "".join(text_at(-6.0, y + 3.5, word, anchor="end") for y, word in beside)
         )
 
-    def _titles(self, place: Place, y_words: list[str]) -> str:
-        aside = -13.0 - max(map(width_of, y_words), default=0.0)
+    def _titles(self, place: Place, y_labels: list[str]) -> str:
+        aside = -13.0 - max(map(width_of, y_labels), default=0.0)
         return "".join(
             (
-                words_at(0.0, -6.0, self.title, size=10, bold=True) if self.title else "",
-                words_at(place.width / 2, place.height + 29.0, self.xlabel, anchor="middle")
+                text_at(0.0, -6.0, self.title, size=10, bold=True) if self.title else "",
+                text_at(place.width / 2, place.height + 29.0, self.xlabel, anchor="middle")
                 if self.xlabel
                 else "",
-                words_at(aside, place.height / 2, self.ylabel, anchor="middle", turned=True)
+                text_at(aside, place.height / 2, self.ylabel, anchor="middle", turned=True)
                 if self.ylabel
                 else "",
             )
@@ -287,13 +287,13 @@ class Axes:
         shades = colours(0.5 * (edges[1:] + edges[:-1]), colormap, low, high)
         ends = np.zeros(32), np.ones(32)
         ticks = scale.ticks(bar.height / 28.0)
-        words = scale.words(ticks)
+        labels = scale.labels(ticks)
         middle = bar.at(0.0, ticks)[1].tolist()
         numbers = "".join(
-            words_at(11.0, y + 3.2, w, size=9) for y, w in zip(middle, words, strict=True)
+            text_at(11.0, y + 3.2, w, size=9) for y, w in zip(middle, labels, strict=True)
         )
-        aside = 14.0 + max((width_of(word, 9.0) for word in words), default=0.0) + SIZE / 2
-        title = words_at(aside, bar.height / 2, name, size=9, anchor="middle", turned=True)
+        aside = 14.0 + max((width_of(word, 9.0) for word in labels), default=0.0) + SIZE / 2
+        title = text_at(aside, bar.height / 2, name, size=9, anchor="middle", turned=True)
         body = Tiles(*ends, edges[:-1], edges[1:], shades).svg(bar) + numbers + title
         at = f"translate({place.width + 6.0:.1f} {0.1 * place.height:.1f})"
         return f'<g transform="{at}">{body}</g>'
@@ -301,11 +301,11 @@ class Axes:
     def _arrow_key(self, place: Place) -> str:
         if self._key is None:
             return ""
-        arrows, words = self._key
+        arrows, labels = self._key
         long = arrows.length * place.width / abs(place.x.high - place.x.low)
-        start = place.width - width_of(words) - long - 4.0
+        start = place.width - width_of(labels) - long - 4.0
         shape = arrows.outline(start, -9.0, start + long, -9.0)
-        text = words_at(start + long + 4.0, -5.5, words)
+        text = text_at(start + long + 4.0, -5.5, labels)
         return f'<path d="{shape}" fill="#000000"/>{text}'
 
 

@@ -21,5 +21,5 @@ def colours(values: FloatArray, name: str, low: float, high: float) -> list[str]
     span = high - low if high > low else 1.0
     at = np.clip((np.nan_to_num(values) - low) / span, 0.0, 1.0) * (len(table) - 1)
     rgb = np.stack([np.interp(at, np.arange(len(table)), column) for column in table.T], axis=-1)
-    words = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(rgb).astype(int).tolist()]
-    return [word if known else "" for word, known in zip(words, np.isfinite(values), strict=True)]
+    text = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(rgb).astype(int).tolist()]
+    return [word if known else "" for word, known in zip(text, np.isfinite(values), strict=True)]

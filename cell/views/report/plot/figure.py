@@ -10,7 +10,7 @@ import numpy as np
 from cell.views.report.plot.axes import Axes
 from cell.views.report.plot.marks import Series
 from cell.views.report.plot.place import Place
-from cell.views.report.plot.text import width_of, words_at
+from cell.views.report.plot.text import text_at, width_of
 
 _POINTS = 72.0
 _SYMBOL = 22.0
@@ -87,8 +87,8 @@ class Figure:
         scales = [(a.scale(0, reach[0]), a.scale(1, reach[1])) for a in self.axes]
         margins = np.zeros((self.rows, self.columns, 4))
         for k, (axes, (_, y)) in enumerate(zip(self.axes, scales, strict=True)):
-            words = axes.ticks(1, y, 0.75 * heights)[1] if self._worded(k)[1] else []
-            margins[divmod(k, self.columns)] = axes.margins(words)
+            labels = axes.ticks(1, y, 0.75 * heights)[1] if self._worded(k)[1] else []
+            margins[divmod(k, self.columns)] = axes.margins(labels)
         aside, above = margins[..., :2].max(axis=0), margins[..., 2:].max(axis=1)
         starts = np.concatenate([[0.0], np.cumsum(self._shares)]) * self.width
         out = []
@@ -118,8 +118,8 @@ class Figure:
 
 
 def _entry(series: Series, left: float, middle: float) -> str:
-    words = words_at(left + _SYMBOL + 5.0, middle + 3.2, series.label, size=_LEGEND_SIZE)
-    return series.symbol(left, middle, _SYMBOL) + words
+    labels = text_at(left + _SYMBOL + 5.0, middle + 3.2, series.label, size=_LEGEND_SIZE)
+    return series.symbol(left, middle, _SYMBOL) + labels
 
 
 def _named(axes: Axes) -> list[Series]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from calib.views import FloatArray
 from cell.views.report.plot.place import Place
-from cell.views.report.plot.text import words_at
+from cell.views.report.plot.text import text_at
 
 _DASHES = {"-": "", "--": "5 2.5", ":": "1.2 2", "-.": "6 2.5 1.2 2.5"}
 _STROKES = "x_"
@@ -257,12 +257,12 @@ class Arrows:
 
 
 @dataclass(frozen=True)
-class Words:
+class TextMark:
     """Words at a point of the data, moved by an offset on the page."""
 
     x: float
     y: float
-    words: str
+    text: str
     right: float = 0.0
     up: float = 0.0
     size: float = 8.0
@@ -278,4 +278,4 @@ class Words:
         """The words."""
         x, y = place.at(self.x, self.y)
         at = float(x) + self.right, float(y) - self.up
-        return words_at(*at, self.words, size=self.size, anchor=self.anchor, color=self.color)
+        return text_at(*at, self.text, size=self.size, anchor=self.anchor, color=self.color)

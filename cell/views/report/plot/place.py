@@ -43,7 +43,7 @@ class Scale:
         last = math.floor(high / step + 1e-9)
         return [step * k for k in range(first, last + 1)]
 
-    def words(self, ticks: list[float]) -> list[str]:
+    def labels(self, ticks: list[float]) -> list[str]:
         """What is written beside the ticks, all with as many decimals as they need."""
         if self.log or len(ticks) < 2:
             return [signed(f"{tick:g}") for tick in ticks]

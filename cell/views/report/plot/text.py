@@ -11,15 +11,15 @@ _WIDTH = 0.56
 """Mean width of a letter of DejaVu Sans as a share of its size; somewhat wide for running text."""
 
 
-def width_of(words: str, size: float = SIZE) -> float:
+def width_of(text: str, size: float = SIZE) -> float:
     """About how wide words are, points."""
-    return _WIDTH * size * len(words)
+    return _WIDTH * size * len(text)
 
 
-def words_at(
+def text_at(
     x: float,
     y: float,
-    words: str,
+    text: str,
     *,
     size: float = SIZE,
     anchor: Literal["start", "middle", "end"] = "start",
@@ -33,5 +33,5 @@ def words_at(
     fill = "" if color == "#000000" else f' fill="{color}"'
     return (
         f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" text-anchor="{anchor}"'
-        f"{weight}{fill}{turn}>{escape(words)}</text>"
+        f"{weight}{fill}{turn}>{escape(text)}</text>"
     )

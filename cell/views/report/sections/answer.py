@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from cell.views.answer_words import answer_words
+from cell.views.answer_text import answer_text
 from cell.views.numbers import UNKNOWN, known, millimetres, number, solution_name
 from cell.views.report import html
 from cell.views.report.answer_values import answer_of, shared_by_distance
 from cell.views.report.data import ReportData
 from cell.views.report.figures import workpiece
 from cell.views.report.sections.drawing import drawing
-from cell.views.report.sections.take_away import take_away
-from cell.views.report.sections.trust import sentences
+from cell.views.report.sections.limitations import sentences
+from cell.views.report.sections.transforms import transforms_section
 from cell.views.report.workpiece_error import WorkpieceError, by_distance, of_solution
 
 _FIRST = 3
@@ -45,7 +45,7 @@ def answer(data: ReportData) -> str:
         f"{html.paragraph(_sentence(data), 'lead')}"
         f"{_warnings(data)}"
         f'<div class="cards">{_cards(data)}</div>'
-        f"{take_away(data)}"
+        f"{transforms_section(data)}"
         f'<div class="{_columns(picture)}"><div>{picture}</div><div>{_by_distance(data, best)}'
         f"<h3>What can be trusted</h3>{_first_few(sentences(data))}</div></div></section>"
     )
@@ -62,7 +62,7 @@ def _first_few(items: Sequence[str]) -> str:
     return html.bullets(items[:_FIRST]) + (more if len(items) > _FIRST else "")
 
 
-def verdict_words(data: ReportData) -> tuple[str, str, str]:
+def verdict_text(data: ReportData) -> tuple[str, str, str]:
     """Verdict, its meaning, and the style of its card."""
     verdict = (data.diagnosis or {}).get("verdict")
     if verdict in _VERDICTS:
@@ -90,8 +90,8 @@ def _title(data: ReportData) -> str:
 
 def _sentence(data: ReportData) -> str:
     if data.calibration is None:
-        return f"No calibration was made here. Diagnosis: {verdict_words(data)[1]}."
-    return answer_words(answer_of(data)) + _caution(data)
+        return f"No calibration was made here. Diagnosis: {verdict_text(data)[1]}."
+    return answer_text(answer_of(data)) + _caution(data)
 
 
 def _warnings(data: ReportData) -> str:
@@ -115,7 +115,7 @@ def _caution(data: ReportData) -> str:
 
 
 def _cards(data: ReportData) -> str:
-    found, (verdict, meaning, css) = answer_of(data) or {}, verdict_words(data)
+    found, (verdict, meaning, css) = answer_of(data) or {}, verdict_text(data)
     usable, error = found.get("usable_distances_m"), found.get("error_at_work_piece_m")
     return "".join(
         (

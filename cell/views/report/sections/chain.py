@@ -22,8 +22,8 @@ _LINKS = (
 def chain(data: ReportData) -> str:
     """One box a link, in the order in which a corner becomes a pixel."""
     boxes = "".join(_box(data, link, role) for link, role in _LINKS)
-    slips = [_words(e) for e in _effects(data, "bookkeeping")]
-    note = html.paragraph(f"Log: {', '.join(slips)}.", "bad-note") if slips else ""
+    mixups = [_label(e) for e in _effects(data, "bookkeeping")]
+    note = html.paragraph(f"Log: {', '.join(mixups)}.", "bad-note") if mixups else ""
     return f'<section id="chain"><ol class="chain">{boxes}</ol>{note}</section>'
 
 
@@ -46,7 +46,7 @@ def _state(data: ReportData, link: str) -> tuple[str, str, str]:
         return "bad", "✗", "something unexplained"
     found = _effects(data, link)
     if found:
-        return "found", "!", ", ".join(_words(e) for e in found)
+        return "found", "!", ", ".join(_label(e) for e in found)
     return "good", "✓", "nothing found"
 
 
@@ -63,5 +63,5 @@ def _effects(data: ReportData, link: str) -> list[Mapping[str, Any]]:
     return [e for e in (data.diagnosis or {}).get("effects") or [] if e.get("link") == link]
 
 
-def _words(effect: Mapping[str, Any]) -> str:
+def _label(effect: Mapping[str, Any]) -> str:
     return str(effect["name"]).replace("_", " ")

@@ -1,4 +1,4 @@
-"""The diagnosis as a story: where it hurts, what it is, how sure, what it costs, what to do."""
+"""The diagnosis in order: where it hurts, what it is, how sure, what it costs, what to do."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from cell.views.report import html
 from cell.views.report.data import ReportData
 from cell.views.report.evidence import picture_of, remedy_of
 from cell.views.report.figures import proof
-from cell.views.report.sections.answer import verdict_words
+from cell.views.report.sections.answer import verdict_text
 from cell.views.report.sections.drawing import drawing
 
 
-def story(data: ReportData) -> str:
+def diagnosis_section(data: ReportData) -> str:
     """The whole diagnosis, or that there was none."""
     if data.diagnosis is None:
         words = "No diagnosis was made: “cell diagnose” makes one from this recording."
         return html.section("diagnosis", "Diagnosis", html.missing(words))
-    verdict, meaning, _ = verdict_words(data)
+    verdict, meaning, _ = verdict_text(data)
     return html.section(
         "diagnosis",
         f"Diagnosis: {verdict.lower()}",
@@ -79,7 +79,7 @@ def _effect(data: ReportData, effect: Mapping[str, Any]) -> str:
         [
             ("What it is", effect.get("physics") or "not described"),
             ("How large", parameters(effect.get("parameters") or {}) or "no parameters"),
-            ("How sure", _sureness(effect)),
+            ("How sure", _confidence(effect)),
             ("What it costs", _cost(data, effect)),
             ("What to do", remedy),
         ],
@@ -90,7 +90,7 @@ def _effect(data: ReportData, effect: Mapping[str, Any]) -> str:
     )
 
 
-def _sureness(effect: Mapping[str, Any]) -> str:
+def _confidence(effect: Mapping[str, Any]) -> str:
     gain = effect.get("holdout_gain_px")
     held = f"; held-out frames improve by {number(gain, 'px', 2)}" if gain else ""
     return f"p {probability(effect.get('p_value'))}{held}"

@@ -42,7 +42,7 @@ def lens(data: ReportData) -> str:
 def _zones(data: ReportData, zones: Mapping[str, Any] | None) -> str:
     if not zones:
         reason = (data.calibration or {}).get("zones_reason") or data.why_missing("zones")
-        return f"Zones were not found: {_words(reason)}."
+        return f"Zones were not found: {_spaced(reason)}."
     near = number(zones["near_limit_m"], "m")
     if known(zones.get("near_sigma_m")):
         near = f"{plus_minus(zones['near_limit_m'], zones['near_sigma_m'])} m"
@@ -65,13 +65,13 @@ def _law(data: ReportData, law: Mapping[str, Any] | None) -> str:
     name = str(law["law"])
     prefer = "decisively" if law.get("decisive") else "but not decisively"
     title = (
-        f"Focus law the data prefer, {prefer}: {_words(name)}, {_FORMULAS.get(name, '')}. "
+        f"Focus law the data prefer, {prefer}: {_spaced(name)}, {_FORMULAS.get(name, '')}. "
         f"{_sentence(law.get('why'))}"
     )
     candidates = law.get("candidates") or [law]
     best = min((c["aicc"] for c in candidates if known(c.get("aicc"))), default=None)
     rows = [
-        (_words(c["law"]), parameters(c.get("parameters") or {}), _difference(c, best),
+        (_spaced(c["law"]), parameters(c.get("parameters") or {}), _difference(c, best),
          number(c.get("scatter"), "", 2))
         for c in candidates
     ]  # fmt: skip
@@ -85,11 +85,11 @@ def _difference(law: Mapping[str, Any], best: float | None) -> str:
 
 
 def _sentence(words: object) -> str:
-    text = _words(words or "").rstrip(".")
+    text = _spaced(words or "").rstrip(".")
     return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
-def _words(name: object) -> str:
+def _spaced(name: object) -> str:
     return str(name).replace("_", " ")
 
 

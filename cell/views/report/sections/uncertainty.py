@@ -38,7 +38,7 @@ def uncertainty_sentences(data: ReportData) -> Iterator[str]:
             f"{number(found['distance_m'][-1], 'm')} (one sigma, image's mean)."
         )
     for weak in calibration.get("not_separable") or ():
-        words = f"These views hardly tell apart {listed(in_words(weak['quantities']))}"
+        words = f"These views hardly tell apart {listed(quantity_names(weak['quantities']))}"
         more = weak["separate_with"]
         helps = f"; {more}." if more.startswith("none") else f": record {more} as well."
         yield words + helps
@@ -60,7 +60,7 @@ _NUMBERS = {
 }
 
 
-def in_words(names: Sequence[str]) -> list[str]:
+def quantity_names(names: Sequence[str]) -> list[str]:
     """The numbers of a calibration as a reader knows them."""
     reported = []
     for name in names:
@@ -122,7 +122,7 @@ def _not_separable(calibration: Mapping[str, Any]) -> str:
     head = ("hardly told apart", "times worse than each alone", "record as well",
             "four such views help")  # fmt: skip
     rows = [
-        (listed(in_words(w["quantities"])), number(w["inflation"], "", 2), w["separate_with"],
+        (listed(quantity_names(w["quantities"])), number(w["inflation"], "", 2), w["separate_with"],
          f"{number(w['gain'], '', 2)} times")
         for w in found
     ]  # fmt: skip

@@ -11,7 +11,7 @@ from cell.sequencer.watched_arm import joints_of
 from drivers.errors import StopFailed
 
 
-def where_it_stands(devices: Devices, named: ArmKinematics) -> FloatArray:
+def start_joints_rad(devices: Devices, named: ArmKinematics) -> FloatArray:
     """(6,) joint angles, read over a link of its own, of the arm that the cell file names.
 
     Raises

@@ -59,14 +59,14 @@ class Knowledge:
             evaluate(self.fit.model, self.views.take(np.array([0]))).camera_from_board[0]
         )
 
-    def flange_that_sees(self, camera_from_board: FloatArray) -> FloatArray:
+    def flange_for_camera_pose(self, camera_from_board: FloatArray) -> FloatArray:
         """(4, 4) base_from_flange from which the camera should see the board so."""
         in_hand = self.views.mount == "eye_in_hand"
         loop = rigid.inverse(camera_from_board) if in_hand else camera_from_board
         model = self.fit.model
         return np.asarray(model.base_from_fixed @ loop @ rigid.inverse(model.flange_from_mounted))
 
-    def surely_sees_whole(self, base_from_flange: FloatArray) -> bool:
+    def whole_board_visible(self, base_from_flange: FloatArray) -> bool:
         """Whether every corner, and a square around, is in the picture by three sigmas."""
         views = self._at(base_from_flange)
 

@@ -14,7 +14,7 @@ from calib.views import FloatArray
 from cell.errors import BadAnswer
 from cell.storage.files.cell_file import CellFile, Layout
 from cell.storage.files.parts import Pose
-from cell.verbs.bootstrap.knowledge import Knowledge
+from cell.verbs.bootstrap.estimate import Knowledge
 
 _GOOD_M = 0.01
 _GOOD_RAD = float(np.radians(1.0))

@@ -16,7 +16,7 @@ _WORDS = ("station",)
 """Keys whose numbers are names, too."""
 
 
-def further_numbers(lines: Sequence[Mapping[str, Any]]) -> dict[str, FloatArray]:
+def additional_numbers(lines: Sequence[Mapping[str, Any]]) -> dict[str, FloatArray]:
     """(N,) of every number by its key, NaN where a frame has none.
 
     The numbers of a list count one by one, from 1: `current_a: [1.0, 2.0]` makes `current_a_1`
@@ -44,7 +44,7 @@ def _numbers(line: Mapping[str, Any]) -> list[tuple[str, float]]:
     return found
 
 
-def further_words(lines: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[np.str_]]:
+def additional_labels(lines: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[np.str_]]:
     """(N,) of every word by its key, empty where a frame has none."""
     keys = dict.fromkeys(k for line in lines for k, v in line.items() if _is_word(k, v))
     return {

@@ -10,7 +10,7 @@ from cell.views.report import html
 from cell.views.report.data import ReportData
 
 
-def take_away(data: ReportData) -> str:
+def transforms_section(data: ReportData) -> str:
     """Each transform with its direction, for ROS, URDF, UR and ABB; nothing where undetermined."""
     if data.calibration is None:
         return ""

@@ -10,7 +10,7 @@ from cell.errors import DiskFailed
 from cell.storage.recording.frames import FrameRecord
 
 
-class KeptFiles:
+class FileWatch:
     """Watches over a recording while it is written.
 
     A file that somebody deletes goes on taking lines that nobody will ever find; so before every

@@ -26,7 +26,7 @@ def dominant(error: Mapping[str, Any]) -> str | None:
     return None
 
 
-def answer_words(answer: Mapping[str, Any] | None) -> str:
+def answer_text(answer: Mapping[str, Any] | None) -> str:
     """The answer in a sentence or two."""
     if not answer:
         return "No calibration was made."

@@ -13,7 +13,9 @@ from cell.storage.incoming.paths import plain_file, reason
 
 
 @contextmanager
-def whole_file(path: Path, *, replace: bool = True, newline: str | None = None) -> Iterator[TextIO]:
+def atomic_file(
+    path: Path, *, replace: bool = True, newline: str | None = None
+) -> Iterator[TextIO]:
     """A text file to write into, which stands at `path` only when all of it is on the disk.
 
     Whatever instant the process dies at, `path` is what it was before or the whole new file.
@@ -53,9 +55,9 @@ def whole_file(path: Path, *, replace: bool = True, newline: str | None = None) 
         raise InputError(f"{path}: cannot be written: {reason(fault)}; give another -o") from None
 
 
-def write_whole(path: Path, text: str, *, replace: bool = True) -> None:
-    """Write a text file, whole or not at all; raises `InputError` as `whole_file` does."""
-    with whole_file(path, replace=replace) as file:
+def write_atomically(path: Path, text: str, *, replace: bool = True) -> None:
+    """Write a text file, whole or not at all; raises `InputError` as `atomic_file` does."""
+    with atomic_file(path, replace=replace) as file:
         file.write(text)
 
 
