@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.solver_speed import BOARD, FREE, HEIGHT, TRUE, WIDTH
+from benchmarks.solver_speed_problem import BOARD, FREE, HEIGHT, TRUE, WIDTH
 from calib.chain import rigid
 from calib.chain.effects import make_effect
 from calib.chain.kinematics import arm

@@ -1,6 +1,8 @@
 """Writes docs/architecture.md and its pictures, the chain and the floors, counted from the code.
 
-``python tools/architecture_page.py`` writes them anew; tests/docs keeps them in step.
+``python tools/architecture_page.py`` writes them anew and prints what it counted: the rooms of the
+operator's side, the arrows between them, and any circle of imports, benchmarks and tests included.
+tests/docs keeps page and pictures in step and the list of circles empty.
 """
 
 from __future__ import annotations
@@ -69,6 +71,26 @@ def files() -> dict[str, str]:
         "pictures/chain.svg": _chain(),
         "pictures/floors.svg": _floors(arrows),
     }
+
+
+def circles() -> list[set[str]]:
+    """Modules that import each other round a circle, deferred imports included; none is right."""
+    graph = grimp.build_graph("cell", "calib", "drivers", "sim", "benchmarks", "tests", "tools")
+    imports = {m: graph.find_modules_directly_imported_by(m) for m in graph.modules}
+    while True:  # a module that imports, or is imported by, nothing that is left is in no circle
+        imported = set().union(*imports.values())
+        left = {m: on & imports.keys() for m, on in imports.items() if on and m in imported}
+        if left == imports:
+            break
+        imports = left
+    return [_circle_of(start, imports) for start in sorted(imports)[:1]]
+
+
+def _circle_of(start: str, imports: dict[str, set[str]]) -> set[str]:
+    way = [start]
+    while way[-1] not in way[:-1]:
+        way.append(min(imports[way[-1]]))
+    return set(way[way.index(way[-1]) :])
 
 
 def _room(module: str) -> str:
@@ -240,6 +262,9 @@ def write() -> None:
     """Write page and pictures into docs/."""
     for name, text in files().items():
         (FOLDER / name).write_text(text, encoding="utf-8")
+    inside = [key for key in _arrows(grimp.build_graph("cell")) if set(key) <= set(FLOORS)]
+    up = [key for key in inside if FLOORS.index(key[0]) > FLOORS.index(key[1])]
+    print(f"{len(FLOORS)} floors, {len(inside)} arrows, {len(up)} upwards, circles: {circles()}")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from tests.docs.pages import ROOT
-from tools.architecture_page import FLOORS, FOLDER, files
+from tools.architecture_page import FLOORS, FOLDER, circles, files
 
 _COUNT = re.compile(r"\d+")
 
@@ -28,6 +28,10 @@ def test_no_arrow_between_floors_runs_up(made: dict[str, str]) -> None:
     assert [floor for floor, _ in rows] == list(FLOORS)
     for at, (_, below) in enumerate(rows):
         assert set(re.findall(r"[a-z]+", below)) <= set(FLOORS[at + 1 :])
+
+
+def test_no_module_imports_itself_round_a_circle() -> None:
+    assert circles() == []
 
 
 def test_contributing_names_files_that_are_there() -> None:
