@@ -112,6 +112,9 @@ def _searched(search: Search, before: JointFit) -> ResidualStructure:
     return find_residual_structure(again, (scatter.cell,))
 
 
+_MOST_OF_IT = 0.5
+"""Of what the names gain: a law that does less leaves most of it to them again."""
+
 _FAR_BEHIND = 60.0
 """A search begun with a law is given up where it is behind by this much: what is left after it, and
 a field that makes names needless, gained less."""
@@ -127,7 +130,8 @@ def _or_laws_first(structure: ResidualStructure, before: JointFit) -> ResidualSt
     again = Search(before, search.fitter, search.branch_price)
     if names == 0 or (names == 1 and not law_leads(again)):
         return structure
-    begun = begin_with_law(again)
+    gained = again.best.criterion - search.best.criterion
+    begun = begin_with_law(again, _MOST_OF_IT * gained)
     if begun is None or again.best.criterion > search.best.criterion + _FAR_BEHIND:
         return structure
     other = find_residual_structure(again, begun=(begun,))

@@ -80,10 +80,10 @@ def law_leads(search: Search) -> bool:
     return bool(laws) and laws[0].worth > search.promised(fit)
 
 
-def begin_with_law(search: Search) -> Cell | None:
+def begin_with_law(search: Search, least: float) -> Cell | None:
     """Take in the law that the plain cell demands, and names beside it; its cell.
 
-    None where there is none, or where it is a name's own physics.
+    None where it gains less than `least` in -2 log likelihood, or is a name's own physics.
     """
     before = search.best
     best_first = demanded(search)
@@ -91,9 +91,12 @@ def begin_with_law(search: Search) -> Cell | None:
         along_its_own(effect, best_first[0].found.law) for effect in catalogue()
     ):
         return None
+    cell = as_cell(best_first, before)
+    if cell.score.gain < least:
+        return None
     search.take_in(best_first[0].candidate, best_first[0].trial.fit)
     search.run()
-    return as_cell(best_first, before)
+    return cell
 
 
 def along_its_own(effect: Effect, law: Law) -> bool:
