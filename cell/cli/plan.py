@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cell.cli.json_flag import JsonFlag
-from cell.views.terminal.output import show
+from cell.views.terminal.output import say, show
 
 if TYPE_CHECKING:
     from cell.storage.files.plan_file import Plan
-    from cell.verbs.plan import Requirements
+    from cell.verbs.plan import PlanSize, Requirements
 
 
 def plan(
@@ -56,10 +56,11 @@ def plan(
         _power(cell, output, requirements, as_json=as_json)
         return
     path = output or cell.with_name(cell.name.split(".")[0] + ".plan.yaml")
-    _print_plan(_written(cell, path, requirements), as_json=as_json)
+    designed, size = _written(cell, path, requirements)
+    _print_plan(designed, size, as_json=as_json)
 
 
-def _designed(cell: Path, path: Path, requirements: Requirements) -> Plan:
+def _designed(cell: Path, path: Path, requirements: Requirements) -> tuple[Plan, PlanSize]:
     from cell.storage.files.cell_file import read_cell
     from cell.storage.files.plan_file import Plan
     from cell.verbs.plan import design_plan
@@ -67,31 +68,37 @@ def _designed(cell: Path, path: Path, requirements: Requirements) -> Plan:
     read = read_cell(cell)
     held = cell.resolve().is_relative_to(path.resolve().parent)  # a plan names no file elsewhere
     named = os.path.relpath(cell.resolve(), path.resolve().parent) if held else None
-    return Plan(path, design_plan(read, requirements.size_for(read), named), read)
+    size = requirements.size_for(read)
+    return Plan(path, design_plan(read, size, named), read), size
 
 
-def _written(cell: Path, path: Path, requirements: Requirements) -> Plan:
+def _written(cell: Path, path: Path, requirements: Requirements) -> tuple[Plan, PlanSize]:
     """Design a plan and write it."""
     from cell.storage.files.writing import check_new, write_new, yaml_text
 
     check_new(path)
-    plan = _designed(cell, path, requirements)
+    plan, size = _designed(cell, path, requirements)
     comment = f"Made by `cell plan {' '.join([cell.name, *requirements.as_options()])}`."
     write_new(path, yaml_text(plan.file.as_mapping(), comment=comment))
-    return plan
+    return plan, size
 
 
-def _print_plan(plan: Plan, *, as_json: bool) -> None:
+def _print_plan(plan: Plan, size: PlanSize, *, as_json: bool) -> None:
     from cell.verbs.plan import clearance, expected_uncertainty, power
+    from cell.verbs.plan.shortfall import shortfalls
 
     stations = [view.station for view in plan.file.views]
     counts = {kind: stations.count(kind) for kind in ("parallel", "varied")}
     near = clearance.of_plan(plan)
+    short = shortfalls(plan, size)
+    for line in short:
+        say(f"warning: {line}")
     promised, seen = expected_uncertainty.expected_from(plan), power.power_of(plan)
     result = {
         "plan": str(plan.path),
         "views": len(stations),
         **counts,
+        "warnings": short,
         "clearance": clearance.as_mapping(near),
         "expected": expected_uncertainty.as_mapping(promised),
         "effects": power.as_shares(seen),
@@ -114,9 +121,9 @@ def _power(given: Path, output: Path | None, requirements: Requirements, *, as_j
     if is_plan(given):
         found = power_of_file(given)
     elif output is None:
-        found = power_of(_designed(given, given, requirements))
+        found = power_of(_designed(given, given, requirements)[0])
     else:
-        found = power_of(_written(given, output, requirements))
+        found = power_of(_written(given, output, requirements)[0])
     if as_json:
         show("", as_mapping(found), as_json=True)
     else:

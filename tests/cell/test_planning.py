@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise, permutations
@@ -22,6 +23,7 @@ from cell.verbs.plan import PlanSize, Requirements, design_plan
 from cell.verbs.plan.candidate_pool import CandidatePool
 from cell.verbs.plan.expected_uncertainty import expected_from
 from cell.verbs.plan.requirements import fewest
+from cell.verbs.plan.shortfall import shortfalls, why_not
 from cell.verbs.plan.tour import nearest_next, shortened, shortest_tour
 from sim import presets
 from tests.cell.plans import CELL
@@ -262,8 +264,39 @@ def test_a_board_out_of_reach_is_said() -> None:
     assert cell.layout is not None
     far = cell.layout.fixed.model_copy(update={"p_m": (3.0, 0.0, 0.0)})
     layout = cell.layout.model_copy(update={"fixed": far, "alpha_px": 500.0})
-    with pytest.raises(InputError, match="the arm can take only 0 views"):
+    with pytest.raises(InputError, match="the arm can take only 0 views") as refused:
         design_plan(cell.model_copy(update={"layout": layout}))
+    assert re.search(
+        r"of (\d+) views .* 0 can be taken, \1 are out of the arm's reach", str(refused)
+    )
+    assert "the board is not in view from home: its middle is" in str(refused)
+
+
+def test_the_cell_of_the_documentation_can_be_planned() -> None:
+    page = (CONFIGS.parent / "docs" / "plan-and-cell-files.md").read_text()
+    text = page.split("## The cell\n\n```yaml\n")[1].split("```")[0]
+    words = why_not(CellFile.model_validate(YAML(typ="safe").load(text)))
+    tried, free = map(
+        int, re.findall(r"of (\d+) views tried over the distances (\d+) can", words)[0]
+    )
+    assert free > tried / 2
+    assert "not in view from home" not in words
+
+
+def test_less_than_was_asked_for_is_said_with_the_reason() -> None:
+    plan = read_plan(CONFIGS / "ur3-robotiq.plan.yaml")
+    assert shortfalls(plan, PlanSize(10, 30)) == ()
+    fewer, why = shortfalls(plan, PlanSize(16, 30))
+    assert fewer == "16 parallel views were asked for and 10 found"
+    assert re.search(r"of 4\d views tried over the distances \d+ can be taken, \d+ ", why)
+    layout = plan.cell.layout
+    assert layout is not None
+    wide = layout.model_copy(update={"distances_m": (0.1, 1.2)})
+    cell = plan.cell.model_copy(update={"layout": wide})
+    near, far, why = shortfalls(replace(plan, cell=cell), PlanSize(10, 30))
+    assert re.match(r"no view is nearer than 0\.3\d+ m, and 0\.1 m was asked for", near)
+    assert re.match(r"no view is farther than 0\.[56]\d+ m, and 1\.2 m was asked for", far)
+    assert "are out of the arm's reach" in why
 
 
 def test_a_plan_survives_writing_and_reading(tmp_path: Path) -> None:

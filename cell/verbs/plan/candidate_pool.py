@@ -17,7 +17,8 @@ from cell.devices.planned_camera import PlannedCamera
 from cell.storage.files.cell_file import CellFile
 from cell.verbs.plan.candidates import TWELFTHS_RAD, parallel, varied
 from cell.verbs.plan.nominal import assume
-from cell.verbs.plan.reach import Candidate, layout_of, planning_guard, reachable, require_enough
+from cell.verbs.plan.reach import Candidate, layout_of, planning_guard, reachable
+from cell.verbs.plan.shortfall import require_enough
 from cell.verbs.plan.size import PlanSize
 
 _VARIED, _MOST_TRIES = 700, 1400

@@ -13,7 +13,8 @@ from cell.storage.files.cell_file import CellFile
 from cell.storage.files.plan_file import SCHEMA, PlanFile
 from cell.verbs.plan.candidate_pool import CandidatePool
 from cell.verbs.plan.candidates import parallel, varied
-from cell.verbs.plan.reach import Candidate, layout_of, planning_guard, reachable, require_enough
+from cell.verbs.plan.reach import Candidate, layout_of, planning_guard, reachable
+from cell.verbs.plan.shortfall import require_enough
 from cell.verbs.plan.size import FEWEST_FRAMES, PlanSize
 from cell.verbs.plan.tour import shortest_tour
 

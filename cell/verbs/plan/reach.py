@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,6 @@ from calib.views import FloatArray
 from cell.errors import InputError
 from cell.sequencer.guard import Guard
 from cell.storage.files.cell_file import CellFile, Layout
-from cell.verbs.plan.size import FEWEST_FRAMES
 
 _FROM_HOME_RAD = np.radians([110.0, 110.0, 110.0, 110.0, 110.0, 200.0])
 """Joints stay this near to home: an arm that folds over or flips its wrist goes a long way."""
@@ -59,16 +58,6 @@ def planning_guard(cell: CellFile) -> Guard:
     return Guard(cell, _SPEED_M_S, _JOINT_SPEED_RAD_S, spare_m=_SPARE_M)
 
 
-def require_enough(reached: Sequence[Candidate], cell: CellFile) -> None:
-    """Raise `InputError` where too few views can be taken to calibrate at all."""
-    if len(reached) < FEWEST_FRAMES:
-        low, high = layout_of(cell).distances_m
-        raise InputError(
-            f"cell {cell.name}: the arm can take only {len(reached)} views of the board between"
-            f" {low} and {high} m. Check layout, workspace and keep_out, or move the board."
-        )
-
-
 def reachable(
     station: str, sights: Iterable[RigidTransform], cell: CellFile, guard: Guard
 ) -> Iterator[Candidate]:
@@ -76,21 +65,25 @@ def reachable(
 
     The arm keeps to home's side of shoulder and elbow, and near to home in every joint.
     """
-    layout = layout_of(cell)
-    fixed, mounted = layout.fixed.transform(), layout.mounted.transform()
-    home = np.radians(layout.home_deg)
+    home = np.radians(layout_of(cell).home_deg)
     centre = cell.board.board().corners_m.mean(axis=0)
     for camera_from_board in sights:
-        middle = camera_from_board.inv() if cell.mount == "eye_in_hand" else camera_from_board
-        pose = (fixed * middle * mounted.inv()).as_matrix()
-        for joints in _usual_branches(pose, home, guard):
+        pose = flange_pose(cell, camera_from_board)
+        for joints in usual_branches(pose, home, guard):
             if guard.may_move(home, joints):
                 depth = float(camera_from_board.apply(centre)[2])
                 yield Candidate(station, depth, pose, joints)
                 break
 
 
-def _usual_branches(pose: FloatArray, home: FloatArray, guard: Guard) -> FloatArray:
+def flange_pose(cell: CellFile, camera_from_board: RigidTransform) -> FloatArray:
+    """(4, 4) base_from_flange from which the camera has the board there."""
+    layout = layout_of(cell)
+    middle = camera_from_board.inv() if cell.mount == "eye_in_hand" else camera_from_board
+    return (layout.fixed.transform() * middle * layout.mounted.transform().inv()).as_matrix()
+
+
+def usual_branches(pose: FloatArray, home: FloatArray, guard: Guard) -> FloatArray:
     """(B, 6) joint angles that reach a flange pose in the arm's usual posture, nearest first."""
     branches = guard.kinematics.inverse_all(pose, home)
     near = (np.abs(branches - home) <= _FROM_HOME_RAD).all(axis=1)
