@@ -267,9 +267,9 @@ def test_a_board_out_of_reach_is_said() -> None:
     with pytest.raises(InputError, match="the arm can take only 0 views") as refused:
         design_plan(cell.model_copy(update={"layout": layout}))
     assert re.search(
-        r"of (\d+) views .* 0 can be taken, \1 are out of the arm's reach", str(refused)
+        r"of (\d+) views .* 0 can be taken, \1 are out of the arm's reach", str(refused.value)
     )
-    assert "the board is not in view from home: its middle is" in str(refused)
+    assert "the board is not in view from home: its middle is" in str(refused.value)
 
 
 def test_the_cell_of_the_documentation_can_be_planned() -> None:
