@@ -36,6 +36,13 @@ def import_(
         Path | None,
         typer.Option(help="File or folder of joint angles; with --robot they make the poses."),
     ] = None,
+    corners: Annotated[
+        Path | None,
+        typer.Option(
+            help="Corner list of another finder (corners.vnl of mrcal, OpenCV's image_points, CSV,"
+            " JSON); the pictures tell its order."
+        ),
+    ] = None,
     rotation: Annotated[
         RotationName | None, typer.Option(help="How the poses' rotations are written.")
     ] = None,
@@ -91,7 +98,12 @@ def import_(
         board=None if board is None else parse_board(board).model_dump(),
         poses=poses,
         joints=joints,
+<<<<<<< HEAD
         stated=StatedConvention(rotation, unit, inverted),
+=======
+        corners=corners,
+        said=Said(rotation, unit, inverted),
+>>>>>>> daccebc (Import corner lists of other finders, in the order that the pictures show)
         mount=mount,
         robot=robot,
         time_bound_s=time_bound,

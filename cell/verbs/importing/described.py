@@ -45,6 +45,8 @@ class Described:
         In the words of `recording.yaml`.
     poses, joints:
         File or folder of the poses, and of joint angles; None without.
+    corners:
+        Corner list of another finder; None: the corners are found here.
     rotation, unit, inverted:
         How poses are written; `inverted`: they are flange_from_base. None where not said: then
         the pictures are asked.
@@ -61,7 +63,12 @@ class Described:
     board: dict[str, Any] | None = None
     poses: Path | None = None
     joints: Path | None = None
+<<<<<<< HEAD
     stated: StatedConvention = field(default_factory=StatedConvention)
+=======
+    corners: Path | None = None
+    said: Said = field(default_factory=Said)
+>>>>>>> daccebc (Import corner lists of other finders, in the order that the pictures show)
     mount: Mount | None = None
     robot: str | None = None
     name: str | None = None

@@ -30,6 +30,7 @@ from cell.storage.recording.detect import Progress, detect_in_pictures
 from cell.verbs.importing.bags.bag import is_bag
 from cell.verbs.importing.bags.importer import import_bag
 from cell.verbs.importing.conventions import Candidate, Convention, conclude
+from cell.verbs.importing.corner_lists import listed_corners
 from cell.verbs.importing.described import Described
 from cell.verbs.importing.joints import as_poses, in_order, radians
 from cell.verbs.importing.outcome import Imported, checked, picture_check
@@ -106,8 +107,13 @@ def _import_pictures(
     notes += sizes
     header = _header(source, size_px, described)
     corners, posed = None, None
-    if series:
+    if series or described.corners is not None:
         corners = _corners_of(header.board.board(), size_px, pictures, progress)
+    if described.corners is not None and corners is not None:
+        board = header.board.board()
+        corners, order = listed_corners(described.corners, pictures, board, corners)
+        notes += order
+    if series and corners is not None:
         posed = _posed(series, pictures, corners, header.board.board(), described)
         header = header.model_copy(update={"imported": _import_record(header, posed)})
         notes += posed.guessed
