@@ -22,7 +22,7 @@ from calib.chain.rigid import inverse
 from calib.detection.orientation import RoughPoses
 from calib.views import FloatArray
 from cell.errors import InputError
-from cell.verbs.importing.conventions import Candidate, Convention, Said, conclude
+from cell.verbs.importing.conventions import Candidate, Convention, StatedConvention, conclude
 from cell.verbs.importing.pairing import apply, pairings
 from cell.verbs.importing.pose_files import flange_series, read_series
 from tests.cell.pose_layouts import LAYOUTS, Layout, picture_names
@@ -45,8 +45,8 @@ def imported(layout: Layout, folder: Path) -> tuple[FloatArray, Convention]:
         for series in flange_series(path, read_series(path))
         for pairing in pairings(names, series.poses)
     ]
-    said = Said(layout.said.get("rotation"))
-    chosen, convention = conclude(candidates, said, ROUGH.closure, VIEWS.board.square_m)
+    stated = StatedConvention(layout.stated.get("rotation"))
+    chosen, convention = conclude(candidates, stated, ROUGH.closure, VIEWS.board.square_m)
     poses = np.array([convention.transform(pose).as_matrix() for pose in chosen.poses])
     return apply(chosen.pairing, poses), convention
 

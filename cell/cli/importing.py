@@ -98,12 +98,8 @@ def import_(
         board=None if board is None else parse_board(board).model_dump(),
         poses=poses,
         joints=joints,
-<<<<<<< HEAD
-        stated=StatedConvention(rotation, unit, inverted),
-=======
         corners=corners,
-        said=Said(rotation, unit, inverted),
->>>>>>> daccebc (Import corner lists of other finders, in the order that the pictures show)
+        stated=StatedConvention(rotation, unit, inverted),
         mount=mount,
         robot=robot,
         time_bound_s=time_bound,

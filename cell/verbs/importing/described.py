@@ -63,12 +63,8 @@ class Described:
     board: dict[str, Any] | None = None
     poses: Path | None = None
     joints: Path | None = None
-<<<<<<< HEAD
-    stated: StatedConvention = field(default_factory=StatedConvention)
-=======
     corners: Path | None = None
-    said: Said = field(default_factory=Said)
->>>>>>> daccebc (Import corner lists of other finders, in the order that the pictures show)
+    stated: StatedConvention = field(default_factory=StatedConvention)
     mount: Mount | None = None
     robot: str | None = None
     name: str | None = None
