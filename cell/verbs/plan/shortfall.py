@@ -33,7 +33,7 @@ def shortfalls(plan: Plan, size: PlanSize) -> tuple[str, ...]:
     plan, size:
         What was found, and what was asked.
     """
-    stations = [view.station for view in plan.file.views]
+    stations: list[str | None] = [view.station for view in plan.file.views]
     lines = []
     asked = {"parallel": (size.parallel, "parallel"), "varied": (size.varied, "tilted")}
     for station, (count, name) in asked.items():
