@@ -10,14 +10,10 @@ import typer
 
 from cell.cli.json_flag import JsonFlag
 from cell.errors import EXIT_BAD_ANSWER, EXIT_DONE, InputError
+from cell.storage.defaults import DRY_RUN_PLAN
 from cell.storage.files.results import new_folder
 from cell.views.page.address import DEFAULT
 from cell.views.terminal.output import say, say_error, show
-
-DEFAULT_PLAN = (
-    Path(__file__).parents[1] / "storage" / "defaults" / "irb140-eosens.plan.yaml"
-).resolve()
-"""In a checkout a link to `configs/`, beside whose file the cell stands as well."""
 
 
 def run(
@@ -103,7 +99,7 @@ def _plan_path(plan: Path | None, dry_run: bool) -> Path:
         return plan
     if not dry_run:
         raise InputError("name the plan to run, or try the simulated cell: cell run --dry-run")
-    return DEFAULT_PLAN
+    return DRY_RUN_PLAN
 
 
 def _folder(plan: Path, output: Path | None, resume: bool) -> Path:

@@ -94,7 +94,7 @@ def _recording(
 
 
 def _run(source: Path, calibration: Path, dry_run: bool, views: int, folder: Path) -> None:
-    """Take the plan's most telling views; leaves with the run's own exit status if it fails."""
+    """Take the plan's most informative views; leaves with the run's own exit status if it fails."""
     from cell.storage.files.plan_file import read_plan
     from cell.verbs.run import Outcome, record
     from cell.verbs.verify.short_plan import shortened

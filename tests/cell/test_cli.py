@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cell.cli.app import main
-from cell.cli.run import DEFAULT_PLAN
+from cell.storage.defaults import DRY_RUN_PLAN
 from cell.storage.files.plan_file import read_plan
 from cell.storage.recording import read_recording
 from tests.cell.plans import CELL, PLAN
@@ -254,4 +254,4 @@ def test_an_image_that_is_not_an_image(cell: Cell, recording_folder: Callable[..
 
 
 def test_the_plan_that_a_dry_run_has_by_itself_names_a_cell_that_is_there() -> None:
-    assert read_plan(DEFAULT_PLAN).cell.robot.model == "irb140"
+    assert read_plan(DRY_RUN_PLAN).cell.robot.model == "irb140"

@@ -50,11 +50,11 @@ def branches_of(views: Views) -> tuple[Views, Branches]:
         joint_velocity_rad_s=nothing,
         approach_joints_rad=nothing,
     )
-    books = repair_log(bare, bare)
-    kinematics = kinematics_of(books.views)
+    repaired = repair_log(bare, bare)
+    kinematics = kinematics_of(repaired.views)
     assert kinematics is not None
-    fit = fit_start(Fitter(books.views), books.free, np.ones(len(books.views), dtype=bool))
-    return books.views, choose_branches(fit, books.views, kinematics)
+    fit = fit_start(Fitter(repaired.views), repaired.free, np.ones(len(repaired.views), dtype=bool))
+    return repaired.views, choose_branches(fit, repaired.views, kinematics)
 
 
 def test_a_sound_arm_without_joints_keeps_the_branches_that_were_guessed_first():

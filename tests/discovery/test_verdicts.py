@@ -122,9 +122,9 @@ def without(*columns: str) -> Views:
 
 def test_joints_that_were_not_logged_are_worked_out_and_that_is_said():
     bare = without("joints_rad", "joint_velocity_rad_s", "approach_joints_rad")
-    books = repair_log(bare, bare)
-    assert np.isfinite(books.views.joints_rad).all()
-    assert "joints" in " ".join(books.output)
+    repaired = repair_log(bare, bare)
+    assert np.isfinite(repaired.views.joints_rad).all()
+    assert "joints" in " ".join(repaired.output)
 
 
 def test_without_times_what_drifts_is_said_to_be_out_of_sight():

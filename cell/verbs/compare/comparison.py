@@ -178,11 +178,11 @@ def _root(side: Side, align: bool) -> FloatArray:
 def _p_value(difference: FloatArray, spread: FloatArray) -> float | None:
     """Chi-square probability of (n,) differences that chance spreads by (n, q)."""
     vectors, size, _ = np.linalg.svd(spread, full_matrices=False)
-    telling = size > _SMALLEST_PX * np.sqrt(len(difference) / 2)
-    if not telling.any():
+    large = size > _SMALLEST_PX * np.sqrt(len(difference) / 2)
+    if not large.any():
         return None
-    z = (vectors[:, telling].T @ difference) / size[telling]
-    return chi2_tail(float((z**2).sum()), int(telling.sum()))
+    z = (vectors[:, large].T @ difference) / size[large]
+    return chi2_tail(float((z**2).sum()), int(large.sum()))
 
 
 def _row(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.chain.model import predict
 from calib.solver.pose_information import pose_information
-from calib.views import BoolArray, Views
+from calib.views import BoolArray, FloatArray, Views
 from cell.devices.simulated_cell import home_of
 from cell.errors import InputError
 from cell.sequencer.guard import Guard
@@ -26,7 +26,7 @@ _MARGIN = 0.03
 
 
 def shortened(old: OldCell, plan: Plan, count: int) -> Plan:
-    """The plan with its most telling views alone.
+    """The plan with its most informative views alone.
 
     Raises
     ------
@@ -38,25 +38,23 @@ def shortened(old: OldCell, plan: Plan, count: int) -> Plan:
     views = plan.file.views
     if count < len(views):
         views = tuple(views[k] for k in _passable(old, plan, count))
-    # a run that ended early would lack the views that tell
+    # a run that ended early would lack the views that show a change
     return replace(plan, file=plan.file.model_copy(update={"views": views, "until": None}))
 
 
 def _passable(old: OldCell, plan: Plan, count: int) -> list[int]:
-    """Places of the most telling views, in an order in which every move is allowed.
+    """Places of the most informative views, in an order in which every move is allowed.
 
     A view that no allowed move leads to from the others is done without.
     """
-    log, guard, home = _log(old, plan), Guard.of(plan), home_of(plan)
-    joints = [home]
-    for k in range(len(plan.file.views)):
-        joints.append(guard.joints_of(plan, k, joints[-1]))
+    guard, home = Guard.of(plan), home_of(plan)
+    log, joints_rad = _log(old, plan, guard, home)
     left = np.arange(len(log))
     while True:
         chosen = left[choose_views(old, log.take(left), count)]
         stops = {
             k: Candidate(
-                plan.file.views[k].station or "", 0.0, log.base_from_flange[k], joints[k + 1]
+                plan.file.views[k].station or "", 0.0, log.base_from_flange[k], joints_rad[k]
             )
             for k in chosen.tolist()
         }
@@ -112,18 +110,18 @@ def _whole(old: OldCell, log: Views) -> BoolArray:
     return np.asarray(inside.all(axis=1) if log.board.kind == "chessboard" else inside.any(axis=1))
 
 
-def _log(old: OldCell, plan: Plan) -> Views:
-    """Where the flange will be in each view, by the arm's nominal kinematics."""
-    guard, here, poses = Guard.of(plan), home_of(plan), []
+def _log(old: OldCell, plan: Plan, guard: Guard, home_rad: FloatArray) -> tuple[Views, FloatArray]:
+    """Where the flange will be in each view, by the arm's nominal kinematics, and (N, J) joints."""
+    joints_rad, poses = [home_rad], []
     for index, view in enumerate(plan.file.views):
+        joints_rad.append(guard.joints_of(plan, index, joints_rad[-1]))
         if view.joints() is None and view.base_from_flange is not None:
             poses.append(view.base_from_flange.transform().as_matrix())
-            continue
-        here = guard.joints_of(plan, index, here)
-        poses.append(guard.kinematics.forward(here))
+        else:
+            poses.append(guard.kinematics.forward(joints_rad[-1]))
     width, height = old.image_size_px
     blank = Views.blank(
         plan.cell.board.board(), width_px=width, height_px=height, frames=len(poses),
         mount=old.mount,
     )  # fmt: skip
-    return replace(blank, base_from_flange=np.array(poses))
+    return replace(blank, base_from_flange=np.array(poses)), np.array(joints_rad[1:])
