@@ -33,6 +33,8 @@ _FIRST_S, _LAST_S = 0.3, 6.0
 _STANDING_S, _POLL_S = 0.2, 0.002
 _TRIES = 4
 _ELBOW = np.eye(6)[2]
+_PUSHED = "moved where it was to stand|left the way|turns at"
+"""The run may not have noted yet that it has arrived, or may be about to go on."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +81,11 @@ def _stops_and_sags(stand: Stand) -> None:
 
 
 DISTURBANCES = (
-    Disturbance("pushed where it stands", "moved where it was to stand", push=_pushes(1.5, 0.2)),
-    Disturbance("sags where it stands", "moved where it was to stand", push=_pushes(20.0, 0.03)),
-    Disturbance("another way, 8° beside", "left the way", _sets(bulge_rad=float(np.radians(8.0)))),
+    Disturbance("pushed where it stands", _PUSHED, push=_pushes(1.5, 0.2)),
+    Disturbance("sags where it stands", _PUSHED, push=_pushes(20.0, 0.03)),
+    Disturbance(
+        "another way, 8° beside", "left the way|turns at", _sets(bulge_rad=float(np.radians(8.0)))
+    ),
     Disturbance(
         "2.5 times as fast as ordered", "turns at|the plan allows", _sets(speed_factor=2.5)
     ),
@@ -165,7 +169,7 @@ def _row(name: str, kind: Disturbance, trials: list[StopTrial]) -> str:
         f"{good} of {len(trials)}",
         worst([trial.order_s for trial in trials]),
         worst([trial.halt_s for trial in trials]) if kind.stands else "-",
-        worst([trial.word_s for trial in trials]),
+        worst([trial.report_s for trial in trials]),
         ", ".join(sorted({str(trial.exit_status) for trial in trials})),
     ]
     return f"| {' | '.join(cells)} |"

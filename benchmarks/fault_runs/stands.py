@@ -81,7 +81,13 @@ def _ur_gige(folder: Path, api_port: int | None) -> Iterator[Stand]:
     with ExitStack() as stack:
         truth, sim, source = _built(plan)
         controller = stack.enter_context(
-            URController(sim, arm_at, kinematics=truth.kinematics, robot_api_port=api_port)
+            URController(
+                sim,
+                arm_at,
+                kinematics=truth.kinematics,
+                robot_api_port=api_port,
+                payload_kg=truth.payload_kg or 0.0,
+            )
         )
         spec = truth.camera
         peer = GigEPeer(

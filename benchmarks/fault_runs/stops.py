@@ -33,7 +33,7 @@ from cell.storage.files.plan_file import read_plan
 from drivers.arm import MoveTarget
 from sim.peers.controller_faults import Stops
 
-_SLOW_DEG_S, _WIDE_DEG = 3.0, 30.0
+_SLOW_DEG_S, _WIDE_DEG = 3.0, {UR: 36.0, ABB: 80.0}
 """Moves of the wrist that last longer than a stop may take to be confirmed."""
 _TRIES = 3
 _POLL_S, _END_S, _WIRE_S = 0.002, 30.0, 0.1
@@ -130,7 +130,8 @@ def slow_stand(name: str, folder: Path, joint_speed_deg_s: float = _SLOW_DEG_S) 
         path = stand.plan.path
         plan = json.loads(path.read_text()) | {"joint_speed_deg_s": joint_speed_deg_s}
         for number, view in enumerate(plan["views"]):
-            view["joints_deg"][-1] += _WIDE_DEG if number % 2 else -_WIDE_DEG
+            # one way only: on the other the UR3's camera comes too near to its own wrist
+            view["joints_deg"][-1] -= 0.0 if number % 2 else _WIDE_DEG[stand.maker]
         path.write_text(json.dumps(plan))
         yield replace(stand, plan=read_plan(path))
 

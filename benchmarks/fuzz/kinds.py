@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from benchmarks.fuzz.kind import Kind
+from benchmarks.fuzz.page import page
 from benchmarks.fuzz.wire import wire
 from cell.errors import CellError
 from cell.sequencer.journal import read_journal, skipped_views
@@ -35,6 +36,7 @@ def kinds() -> Iterator[Kind]:
     yield from _poses()
     yield from _pictures()
     yield from wire()
+    yield from page()
 
 
 def _in(name: str, read: Callable[[Path], object]) -> Callable[[Path, bytes], object]:

@@ -122,7 +122,10 @@ def _arm_peer(
     if wire == "ur":
         from sim.peers.ur import URController
 
-        return stack.enter_context(URController(arm, address, kinematics=cell.kinematics)).address
+        controller = URController(
+            arm, address, kinematics=cell.kinematics, payload_kg=cell.payload_kg or 0.0
+        )
+        return stack.enter_context(controller).address
     from sim.peers.abb import ABBController
 
     return stack.enter_context(ABBController(arm, address, _ABB_PORT)).url

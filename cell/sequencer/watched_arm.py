@@ -13,6 +13,7 @@ import numpy as np
 
 from calib.views import FloatArray
 from cell.errors import StoppedByOperator
+from cell.sequencer.as_configured import check_as_configured
 from cell.sequencer.clock import Clock
 from cell.sequencer.confirmed_stop import ConfirmedStop, StopReport
 from cell.sequencer.guard import Guard
@@ -66,12 +67,13 @@ class WatchedArm:
     def connect(self) -> FloatArray:
         """Open the link; returns the (6,) joint angles the arm stands at.
 
-        Raises `SafetyError` where it is not the arm that the guard knows.
+        Raises `SafetyError` where it is not the arm that the guard knows, or is set otherwise.
         """
         self.arm.connect()
         self.connected = True
         state = self.watch()
         check_same_arm(self.guard.kinematics, state)
+        check_as_configured(self.guard.cell.robot, self.guard.kinematics, state.raw)
         return joints_of(state)
 
     def watch(self) -> ArmState:

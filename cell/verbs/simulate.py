@@ -20,6 +20,7 @@ from cell.errors import BadAnswer, InputError
 from cell.sequencer.session import header_of, record_plan
 from cell.storage.files.cell_file import EffectFile, Simulation
 from cell.storage.files.plan_file import Plan
+from cell.storage.incoming.limits import MAGNITUDE
 from cell.storage.recording import Corners, FrameRecord, PoseRecord, RecordingWriter, write_corners
 from cell.storage.recording.corners import FILE_NAME as DETECTIONS
 from cell.storage.recording.header import Capture
@@ -159,5 +160,7 @@ def _numbers(text: str, pair: str, value: str) -> float | tuple[float, ...]:
     try:
         numbers = tuple(float(part) for part in value.split("/"))
     except ValueError:
-        raise InputError(f"--effect {text}: the value of `{pair}` is no number") from None
+        numbers = ()
+    if not (numbers and all(abs(number) <= MAGNITUDE for number in numbers)):
+        raise InputError(f"--effect {text[:200]}: the value of `{pair[:80]}` is no number")
     return numbers if len(numbers) > 1 else numbers[0]

@@ -1,8 +1,8 @@
 """The controller's own kinematics: its factory-calibrated Denavit-Hartenberg parameters.
 
 Source: Universal Robots, "Remote Control Via TCP/IP", primary client interface, port 30001: robot
-state package (type 16), sub-package 5. Calibrated a and d may be hundreds of metres long where
-axes are almost parallel: they are parameters of the chain, not lengths of links.
+state package (type 16), sub-packages 5 and 6 (configuration). Calibrated a and d may be hundreds of
+metres long where axes are almost parallel: they are parameters of the chain, not lengths of links.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from drivers.errors import DeviceError
 from drivers.outside import exactly
 
 PRIMARY_PORT = 30001
-_ROBOT_STATE, _KINEMATICS = 16, 5
+_ROBOT_STATE, _KINEMATICS, _CONFIGURATION = 16, 5, 6
 _HEADER = struct.Struct(">IB")
 _BODY = struct.Struct(">6I6d6d6d6dI")
+_LIMITS = struct.Struct(">12d")
 _STATUS = {0: "not initialised", 1: "not linearised", 2: "linearised"}
 _LONGEST_PACKAGE = 1 << 20
 
@@ -38,6 +39,8 @@ class KinematicsInfo:
         The controller's six checksums; they tell one arm from another.
     calibration_status:
         ``linearised`` where a factory calibration is in force.
+    joint_limits_rad:
+        Six ranges of the safety settings, or None where they are not told.
     """
 
     theta_rad: tuple[float, ...]
@@ -46,6 +49,7 @@ class KinematicsInfo:
     alpha_rad: tuple[float, ...]
     checksum: tuple[int, ...]
     calibration_status: str
+    joint_limits_rad: tuple[tuple[float, float], ...] | None = None
 
     def flange_positions_m(self, joints_rad: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (N, 3) flange positions in the base for (N, 6) joint angles."""
@@ -91,7 +95,8 @@ def _package(link: socket.socket, deadline: float) -> tuple[int, bytes]:
 
 def _checked(host: str, found: KinematicsInfo) -> KinematicsInfo:
     tables = (found.theta_rad, found.a_m, found.d_m, found.alpha_rad)
-    if not np.isfinite(tables).all():
+    limits = found.joint_limits_rad or ()
+    if not (np.isfinite(tables).all() and np.isfinite(limits).all()):
         raise DeviceError(
             f"UR controller {host}: the kinematics on port {PRIMARY_PORT} are not finite. Restart "
             "the controller; if it goes on, its calibration file is damaged"
@@ -101,21 +106,27 @@ def _checked(host: str, found: KinematicsInfo) -> KinematicsInfo:
 
 def _find(package: tuple[int, bytes]) -> KinematicsInfo | None:
     kind, body = package
-    if kind != _ROBOT_STATE:
+    parts = _parts(body) if kind == _ROBOT_STATE else {}
+    if _KINEMATICS not in parts:
         return None
+    values = _BODY.unpack_from(parts[_KINEMATICS])
+    theta, a, d, alpha = (values[i : i + 6] for i in range(6, 30, 6))
+    status = _STATUS.get(values[30], f"status {values[30]}")
+    limits = None
+    if _CONFIGURATION in parts:
+        flat = _LIMITS.unpack_from(parts[_CONFIGURATION])
+        limits = tuple(zip(flat[::2], flat[1::2], strict=True))
+    return KinematicsInfo(theta, a, d, alpha, values[:6], status, limits)
+
+
+def _parts(body: bytes) -> dict[int, bytes]:
+    """Sub-packages of a robot state, by their number."""
+    found: dict[int, bytes] = {}
     at = 0
     while at + _HEADER.size <= len(body):
         size, part = _HEADER.unpack_from(body, at)
-        if part == _KINEMATICS:
-            return _decode(body[at + _HEADER.size : at + size])
         if size < _HEADER.size:
-            return None
+            break
+        found[part] = body[at + _HEADER.size : at + size]
         at += size
-    return None
-
-
-def _decode(body: bytes) -> KinematicsInfo:
-    values = _BODY.unpack_from(body)
-    theta, a, d, alpha = (values[i : i + 6] for i in range(6, 30, 6))
-    status = _STATUS.get(values[30], f"status {values[30]}")
-    return KinematicsInfo(theta, a, d, alpha, values[:6], status)
+    return found

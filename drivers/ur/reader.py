@@ -30,8 +30,9 @@ OUTPUTS = [
     "robot_mode",
     "runtime_state",
 ]
-
-
+OPTIONAL = ["payload"]
+"""What older controllers do not tell."""
+_UNKNOWN = "NOT_FOUND"
 _REOPEN_S, _REOPEN_PAUSE_S = 0.5, 0.05
 
 
@@ -44,7 +45,8 @@ class Packet:
     host_t_s:
         Host clock (`time.monotonic`) when it was sampled: see `SampleTimes`.
     values:
-        The `OUTPUTS` as the controller sent them: radians, metres, seconds.
+        The `OUTPUTS`, and `OPTIONAL` ones, as the controller sent them: radians, metres, seconds,
+        kilograms.
     """
 
     host_t_s: float
@@ -187,22 +189,30 @@ class RtdeReader:
         version = struct.pack(">H", PROTOCOL_VERSION)
         if self._ask(link, deadline_s, Frame.REQUEST_PROTOCOL_VERSION, version) != b"\x01":
             raise DeviceRefused(f"UR controller {self._host}: speaks no RTDE version 2: update it")
-        asked = struct.pack(">d", self._rate_hz) + ",".join(OUTPUTS).encode()
-        answer = self._ask(link, deadline_s, Frame.SETUP_OUTPUTS, asked)
-        types = answer[1:].decode(errors="replace").split(",")
-        missing = [name for name, kind in zip(OUTPUTS, types, strict=False) if kind == "NOT_FOUND"]
+        names = [*OUTPUTS, *OPTIONAL]
+        types = self._types(link, deadline_s, names)
+        unknown = [name for name, kind in zip(names, types, strict=False) if kind == _UNKNOWN]
+        missing = [name for name in unknown if name in OUTPUTS]
         if missing:
             raise DeviceRefused(
                 f"UR controller {self._host}: does not know {', '.join(missing)}. The flange pose "
                 "needs tcp_offset, which exists from PolyScope 5.5.1 (CB3: 3.12): update it"
             )
+        if unknown:
+            names = OUTPUTS
+            types = self._types(link, deadline_s, names)
         try:
-            recipe = Recipe(OUTPUTS, types)
+            recipe = Recipe(names, types)
         except ValueError as error:
             raise DeviceError(f"UR controller {self._host}: RTDE answers {error}") from None
         if self._ask(link, deadline_s, Frame.START) != b"\x01":
             raise DeviceError(f"UR controller {self._host}: refuses to start sending its state")
         return recipe
+
+    def _types(self, link: socket.socket, deadline_s: float, names: list[str]) -> list[str]:
+        asked = struct.pack(">d", self._rate_hz) + ",".join(names).encode()
+        answer = self._ask(link, deadline_s, Frame.SETUP_OUTPUTS, asked)
+        return answer[1:].decode(errors="replace").split(",")
 
     @staticmethod
     def _ask(link: socket.socket, deadline_s: float, kind: Frame, payload: bytes = b"") -> bytes:

@@ -98,7 +98,8 @@ def standing(model: str) -> SimArm:
 @pytest.fixture
 def ur() -> Iterator[URController]:
     arm = standing("ur5e")
-    with URController(arm, "127.0.0.78") as controller:
+    kinematics = kinematics_of("ur5e")
+    with URController(arm, "127.0.0.78", kinematics=kinematics) as controller:
         yield controller
 
 
@@ -152,6 +153,24 @@ def test_a_protective_stop_and_a_tool_in_millimetres_are_named(
     findings = examine(ur_cell(tmp_path, ur))
     assert by_name(findings, "UR safety").blocks
     assert "slip of units" in by_name(findings, "UR tool").line()
+
+
+def test_settings_that_differ_from_the_cell_file_are_in_the_way(
+    tmp_path: Path, ur: URController
+) -> None:
+    more = "payload_kg: 1.2, tcp: {p_m: [0, 0, 0.1], rpy_deg: [0, 0, 0]}"
+    cell = cell_with(tmp_path, f"{{driver: ur, model: ur5e, address: {ur.address}, {more}}}")
+    ur.joint_limits_rad[3] = [-1.0, 1.0]
+    findings = [finding for finding in examine(cell) if finding.blocks]
+    assert [finding.name for finding in findings] == [
+        "UR joint limits",
+        "UR tool centre point as in the cell file",
+        "UR payload as in the cell file",
+    ]
+    assert "joint_limits_deg.joint_4" in findings[0].line()
+    ur.joint_limits_rad[3] = [-7.0, 7.0]
+    ur.tcp_offset, ur.payload_kg = (0.0, 0.0, 0.1, 0.0, 0.0, 0.0), 1.2
+    assert not [finding.line() for finding in examine(cell) if finding.blocks]
 
 
 @pytest.fixture

@@ -25,6 +25,7 @@ from cell.storage.incoming.arrays import read_arrays
 from cell.storage.incoming.pictures import decode_picture, read_picture
 from cell.storage.recording import read_recording
 from cell.verbs.importing.pose_files import read_series
+from cell.verbs.simulate import parse_effect
 from tests.cell.plans import CELL, PLAN
 from tests.cell.recordings import HEADER, frame_line
 
@@ -349,3 +350,18 @@ def test_an_arm_that_nobody_knows(tmp_path: Path) -> None:
     (tmp_path / "p.yaml").write_text((configs / "ur3-robotiq.plan.yaml").read_text())
     with pytest.raises(InputError, match=r"robot.model: .*kr10.* use one of ur3"):
         simulated_devices(read(tmp_path / "p.yaml"))
+
+
+def test_a_recording_of_an_arm_that_nobody_knows_is_read_without_its_joints(
+    recording_folder: Folder, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = recording_folder(header=HEADER.replace("ur5e", "kr10"))
+    assert "kr10" in (folder / "recording.yaml").read_text()
+    assert read_recording(folder).views().robot_model is None
+    assert "robot.model kr10 is not known" in caplog.text
+
+
+@pytest.mark.parametrize("value", ["nan", "1e999", "-inf", "9" * 400, "1/nan", "", "x"])
+def test_an_effect_whose_value_is_no_number(value: str) -> None:
+    with pytest.raises(InputError, match="is no number"):
+        parse_effect(f"focus_breathing:k_px_m2={value}")

@@ -121,6 +121,7 @@ def test_with_the_token_the_page_and_its_buttons_work(live: LiveRun) -> None:
         {"origin": "http://elsewhere.example"},
         {"origin": "http://elsewhere.example", "x_cell_page": "1"},
         {"origin": "null", "x_cell_page": "1"},
+        {"origin": "http://[", "x_cell_page": "1"},
         {"host": "elsewhere.example", "x_cell_page": "1"},
         {"host": "elsewhere.example:8470", "x_cell_page": "1"},
     ],

@@ -198,3 +198,33 @@ def test_it_lives_in_real_time_too():
     assert clock.now() - started > 0.2
     robot.close()
     robot.close()
+
+
+def test_a_push_turns_it_without_an_order_and_a_stop_holds_it_unless_its_brakes_slip():
+    robot, clock = ready()
+    by = np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0])
+    robot.push(by, 0.2)
+    np.testing.assert_allclose(arrive(robot, clock)[-1].joints_rad, HOME + by, atol=1e-12)
+    robot.push(by, 0.05)
+    clock.sleep(0.5)
+    robot.stop()
+    assert 0.1 < arrive(robot, clock)[-1].joints_rad[2] - HOME[2] < 0.15
+    robot.faults.brakes_slip = True
+    robot.push(by, 0.05)
+    robot.stop()
+    assert arrive(robot, clock)[-1].joints_rad[2] - HOME[2] > 0.19
+
+
+def test_another_way_leads_to_the_same_place_and_another_speed_sooner():
+    robot, clock = ready()
+    robot.faults.bulge_rad = 0.1
+    goal = np.add(HOME, [0.4, 0.0, 0.0, 0.0, 0.0, 0.0])
+    robot.start_move(MoveTarget(joints_rad=tuple(goal)))
+    way = np.array([state.joints_rad for state in arrive(robot, clock, 0.01)])
+    assert np.abs(way[:, 2] - HOME[2]).max() == pytest.approx(0.1, abs=1e-3)
+    np.testing.assert_allclose(way[-1], goal, atol=1e-12)
+    began_s = clock.now()
+    robot.faults.speed_factor = 2.0
+    robot.start_move(MoveTarget(joints_rad=tuple(HOME), tcp_speed_m_s=5.0, joint_speed_rad_s=0.1))
+    arrive(robot, clock, 0.01)
+    assert clock.now() - began_s == pytest.approx(0.4 / 0.2, abs=0.5)

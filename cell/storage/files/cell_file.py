@@ -58,7 +58,11 @@ class SimulatedRobot(Part):
     flange: str = "tool0"
     """Link of `urdf` that is the tool flange."""
     payload_kg: float = Field(default=0.0, ge=0)
-    """Mass of camera and bracket at the flange."""
+    """Mass of camera and bracket at the flange. Where it is given, an arm whose controller tells
+    another one is not moved."""
+    tcp: Pose | None = None
+    """flange_from_tcp as it is set at the controller: an arm with another one is not moved. With
+    null any will do, since it is taken out of every pose."""
 
 
 class UniversalRobot(SimulatedRobot):

@@ -6,7 +6,6 @@ from typing import Annotated, Final, Literal
 
 from pydantic import ConfigDict, Field, PositiveFloat
 
-from cell.storage.files.provenance_part import ProvenancePart
 from cell.storage.files.result_part import ResultPart
 
 SCHEMA: Final = "cell.verify/1"
@@ -144,7 +143,7 @@ Verdict = Literal[
 ]
 
 
-class VerifyFile(ProvenancePart):
+class VerifyFile(ResultPart):
     """The whole of `verify.json`; metres, radians, pixels."""
 
     model_config = ConfigDict(

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.chain.kinematics import MODELS, UnknownArm, arm
 from calib.views import Board, FloatArray, Views
 from cell.errors import InputError
 from cell.storage.incoming import inside, plain_file, read_picture
@@ -178,7 +179,7 @@ def frames_as_views(
         blank,
         frame=np.array([frame.frame for frame in frames], dtype=np.int64),
         base_from_flange=_poses(frames),
-        robot_model=header.robot.model,
+        robot_model=_known_model(recording.path, header.robot.model),
         payload_kg=header.robot.payload_kg,
         moving=header.capture.mode == "moving",
         extra=additional_numbers(_additional(frames)),
@@ -186,6 +187,21 @@ def frames_as_views(
         **columns,
         **_corner_columns(frames, corners or Corners({}), blank),
     )
+
+
+def _known_model(path: Path, model: str | None) -> str | None:
+    """The arm's model, or None where nobody knows its kinematics: it is calibrated without."""
+    try:
+        return None if model is None else arm(model).name
+    except UnknownArm:
+        log.warning(
+            "%s: robot.model %s is not known, so its joint angles are not used; put its description"
+            " there as robot.urdf, or write one of %s",
+            path,
+            str(model)[:80],
+            ", ".join(MODELS),
+        )
+        return None
 
 
 def _joint_count(path: Path, frames: Sequence[FrameRecord]) -> int:

@@ -16,11 +16,9 @@ from calib.chain.model import CellModel
 from calib.detection.same_order import same_order_everywhere
 from calib.discovery.diagnose import diagnose
 from calib.discovery.diagnosis import Diagnosis
-from calib.discovery.laws.shape import law_shapes
 from calib.errors import CalibrationError
 from calib.views import Views
 from cell.errors import BadAnswer, InputError
-from cell.storage.files.provenance import provenance
 from cell.storage.files.results import results_folder, write_results
 from cell.storage.recording import Corners, Recording, frames_as_views, read_frames
 from cell.storage.recording.detect import Progress, corners_of
@@ -98,8 +96,7 @@ def diagnose_into(
         raise BadAnswer(f"{recording.path}: {error}") from None
     plans = separations(found, recording)
     notes = brightness_notes(recording, found)
-    origin = provenance(recording.header.as_mapping())
-    mapping = as_mapping(found, recording.name, plans, notes, origin)
+    mapping = as_mapping(found, recording.name, plans, notes)
     write_results(folder, {DIAGNOSIS: json.dumps(mapping, indent=1) + "\n"})
     write_results(folder, {TWIN: twin_text(found, recording)})
     write_results(folder, {plan.file: plan.text for plan in plans if plan.file is not None})
@@ -158,7 +155,6 @@ def _report(
         corner_px=noise.corner_px,
         flange_m=noise.flange_m,
     )
-    evidence = replace(evidence, laws=law_shapes(found.twin, found.views))
     known = None if truth is None else simulation_truth(truth, data.views)
     data = replace(data, diagnosis=mapping, evidence=evidence, truth=known)
     write_report(folder / REPORT, data)

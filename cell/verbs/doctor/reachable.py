@@ -25,7 +25,7 @@ def reachable(cell: CellFile) -> list[Finding]:
 def _robot(cell: CellFile) -> list[Finding]:
     robot = cell.robot
     if isinstance(robot, UniversalRobot):
-        return [*universal_robot(robot), _payload(cell)]
+        return [*universal_robot(robot, cell.joint_limits_deg), _payload(cell)]
     if isinstance(robot, AbbRobot):
         return [*abb(robot), _payload(cell)]
     return [Finding("arm", True, f"simulated {robot.model}")]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
-from calib.chain.kinematics import MODELS, ArmKinematics, arm
+from calib.chain.kinematics import ArmKinematics, UnknownArm, arm
+from cell.sequencer.as_configured import limits_differ, payload_differs, tcp_differs
 from cell.sequencer.same_arm import flange_difference, model_differs
-from cell.storage.files.cell_file import UniversalRobot
+from cell.storage.files.cell_file import JointLimits, UniversalRobot
 from cell.verbs.doctor.finding import Finding
 from cell.verbs.doctor.ports import CHECK_LINE, port
 from drivers.errors import DeviceError
+from drivers.ur.kinematics_info import read_kinematics
 from drivers.ur.panel import Panel
 from drivers.ur.pose import base_from_flange
 from drivers.ur.reader import Packet, RtdeReader
@@ -24,12 +27,14 @@ _LONGEST_TOOL_M = 1.0
 _CLOCK_SLIP_S = 0.02
 
 
-def universal_robot(robot: UniversalRobot) -> list[Finding]:
-    """Which PolyScope it is, ports, remote control, safety, power, TCP and clock."""
+def universal_robot(robot: UniversalRobot, limits: JointLimits | None = None) -> list[Finding]:
+    """Which PolyScope it is, ports, remote control, safety, power, settings and clock."""
     ports = [port(f"UR {name}", robot.address, number) for number, name in _PORTS.items()]
     _, rtde = ports
     findings = [*_panel(robot), *ports]
-    return findings + (_packets(robot) if rtde.ready else [])
+    if not rtde.ready:
+        return findings
+    return [*findings, *_limits(robot, limits), *_packets(robot)]
 
 
 def _panel(robot: UniversalRobot) -> list[Finding]:
@@ -96,11 +101,48 @@ def _packets(robot: UniversalRobot) -> list[Finding]:
         return [Finding("UR state", False, str(fault), CHECK_LINE)]
     finally:
         reader.close()
-    same = [] if robot.model not in MODELS else [_same_arm(arm(robot.model), heard[-1])]
-    return [*same, _tool(heard[-1]), _clock(heard)]
+    return [*_same_arm(robot, heard[-1]), *_settings(robot, heard[-1]), _clock(heard)]
 
 
-def _same_arm(named: ArmKinematics, packet: Packet) -> Finding:
+def _settings(robot: UniversalRobot, packet: Packet) -> list[Finding]:
+    raw = packet.values
+    findings = [_tool(packet)]
+    for name, wrong in (
+        ("UR tool centre point as in the cell file", tcp_differs(robot, raw)),
+        ("UR payload as in the cell file", payload_differs(robot, raw)),
+    ):
+        findings += [Finding(name, False, what, "see there") for what in wrong]
+    return findings
+
+
+def _limits(robot: UniversalRobot, limits: JointLimits | None) -> list[Finding]:
+    """Joint limits of the safety settings, where the controller tells them."""
+    try:
+        named = arm(robot.model or "")
+        told = read_kinematics(robot.address)
+    except (UnknownArm, DeviceError):
+        return []
+    if told is None or told.joint_limits_rad is None:
+        return []
+    if limits is not None:
+        named = replace(named, limits_rad=limits.narrowed(named.limits_rad))
+    wrong = limits_differ(named, {"kinematics": vars(told)})
+    return [
+        Finding(
+            "UR joint limits", not wrong, "; ".join(wrong) or "as wide as the cell's", "see there"
+        )
+    ]
+
+
+def _same_arm(robot: UniversalRobot, packet: Packet) -> list[Finding]:
+    try:
+        named = arm(robot.model or "")
+    except UnknownArm:
+        return []
+    return [_same_flange(named, packet)]
+
+
+def _same_flange(named: ArmKinematics, packet: Packet) -> Finding:
     reported = base_from_flange(packet.vector("actual_TCP_pose"), packet.vector("tcp_offset"))
     found = flange_difference(named, np.array(packet.vector("actual_q")), reported)
     return Finding(

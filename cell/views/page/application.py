@@ -8,7 +8,6 @@ import hashlib
 import json
 from collections.abc import AsyncIterator, Callable
 from importlib.resources import files
-from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -99,7 +98,7 @@ class Page:
             return "The token is missing or wrong: open the address that `cell run` printed."
         if request.method == "POST":
             origin = request.headers.get("origin")
-            if origin is not None and urlsplit(origin).netloc != host:
+            if origin is not None and origin.partition("://")[2] != host:
                 return "Only this page itself may press its buttons."
             if OWN_HEADER not in request.headers:
                 return f"The header {OWN_HEADER} is missing."

@@ -12,6 +12,8 @@ from __future__ import annotations
 import threading
 import time
 
+import numpy as np
+
 from calib.chain.kinematics import ArmKinematics
 from drivers.arm import Arm, Motion, MoveTarget
 from drivers.errors import DeviceError, SafetyError
@@ -52,9 +54,13 @@ class URController:
         Of PolyScope X; see `sim.peers.ur.robot_api`.
     rate_hz:
         Cycle of the control loop and highest RTDE rate.
+    payload_kg:
+        Mass at the flange as it is set at the pendant.
 
     Attributes
     ----------
+    tcp_offset, joint_limits_rad:
+        As they are set at the pendant: flange_from_tcp as a six-vector, (6, 2) joint limits.
     faults:
         What goes wrong with it, on command.
     stop_orders:
@@ -72,6 +78,7 @@ class URController:
         robot_api_port: int | None = None,
         robot_api_version: str = "5.0.107",
         rate_hz: float = 125.0,
+        payload_kg: float = 0.0,
     ) -> None:
         self.arm = arm
         self.address = address
@@ -80,7 +87,8 @@ class URController:
         self.version = _POLYSCOPE_5 if robot_api_port is None else _POLYSCOPE_X
         self._robot_api = robot_api_port, robot_api_version
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
-        self.payload_kg = 0.0
+        self.payload_kg = payload_kg
+        self.joint_limits_rad = np.full((6, 2), 2 * np.pi) * [-1.0, 1.0]
         self.payload_cog_m: tuple[float, ...] = (0.0,) * 3
         self.remote_control = True
         self.faults = URFaults()

@@ -2,7 +2,8 @@
 
 Source: Universal Robots, "Remote Control Via TCP/IP", client interfaces: a package is int32 size,
 uint8 type (16 robot state, 20 message); a robot state holds sub-packages of the same shape, of
-which type 5 is the kinematics information.
+which type 5 is the kinematics information and type 6 the configuration, which begins with each
+joint's lower and upper limit.
 """
 
 from __future__ import annotations
@@ -16,11 +17,14 @@ from collections.abc import Callable
 from typing import Protocol
 
 from calib.chain.kinematics import ArmKinematics
+from calib.views import FloatArray
 from sim.peers.controller_faults import ControllerFaults
 
 _PERIOD_S = 0.1
 _MESSAGE, _ROBOT_STATE = 20, 16
-_ROBOT_MODE, _KINEMATICS = 0, 5
+_ROBOT_MODE, _KINEMATICS, _CONFIGURATION = 0, 5, 6
+_REST_OF_CONFIGURATION = bytes(344)
+"""Speeds, accelerations, defaults and kinematics once more: nobody here asks for them."""
 _LINEARISED = 2
 
 
@@ -28,6 +32,7 @@ class Controller(Protocol):
     """What this port shows of its controller."""
 
     kinematics: ArmKinematics | None
+    joint_limits_rad: FloatArray
 
     @property
     def faults(self) -> ControllerFaults:
@@ -69,7 +74,12 @@ class PrimaryServer:
             return mode
         theta, d, a, alpha = self._controller.kinematics.dh[:, :4].T
         body = struct.pack(">6I24dI", *range(6), *theta, *a, *d, *alpha, _LINEARISED)
-        return mode + _package(_KINEMATICS, body)
+        limits = struct.pack(">12d", *self._controller.joint_limits_rad.ravel())
+        return (
+            mode
+            + _package(_KINEMATICS, body)
+            + _package(_CONFIGURATION, limits + _REST_OF_CONFIGURATION)
+        )
 
 
 def _package(kind: int, body: bytes) -> bytes:

@@ -73,9 +73,9 @@ def test_rtde_is_waited_for_no_longer_than_was_meant(data):
 @pytest.mark.parametrize(
     ("types", "words"),
     [
-        (["GARBAGE"] * 9, "unknown type for timestamp"),
-        (TYPES[:4], "4 types for 9 names"),
-        (["\udcff\x00"] * 9, "unknown type"),
+        (["GARBAGE"] * 10, "unknown type for timestamp"),
+        (TYPES[:4], "4 types for 10 names"),
+        (["\udcff\x00"] * 10, "unknown type"),
     ],
 )
 def test_a_recipe_that_cannot_be_is_refused_by_name(types, words):
