@@ -26,7 +26,7 @@ _LARGEST_FOCUS = 1023
 _POLL_S = 0.05
 _SAME_IN_A_ROW = 4
 NO_SETTINGS = (
-    "this firmware does not tell its settings, so they cannot be set and confirmed from here; "
+    "this firmware does not report its settings, so they cannot be set and confirmed from here; "
     "set them on the teach pendant and leave them out of the plan"
 )
 

@@ -92,7 +92,7 @@ class Solution:
     sigma:
         One-sigma by name, of the numbers that were fitted.
     at_distance_m:
-        Distance at which alpha and beta are told where they move, else None.
+        Distance at which alpha and beta are given where they move, else None.
     values:
         The numbers of `VALUES`, and further distortion terms that the fit freed (`p1`, `p2`, `k3`).
     focus:

@@ -77,7 +77,7 @@ def before_every_verb(
         bool, typer.Option("-v", "--verbose", help="Say more of what is done, on stderr.")
     ] = False,
     log: Annotated[
-        Path | None, typer.Option("--log", help="Keep everything that is said of it in a file.")
+        Path | None, typer.Option("--log", help="Write every message to a file, too.")
     ] = None,
 ) -> None:
     """Calibrate a camera on a robot, and name the physics a plain model leaves out."""

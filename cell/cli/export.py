@@ -38,7 +38,7 @@ def export(
         str | None, typer.Option("--solution", help="Which solution; the best one without.")
     ] = None,
     image_size: Annotated[
-        str | None, typer.Option(help="WIDTHxHEIGHT, for a file that does not tell.")
+        str | None, typer.Option(help="WIDTHxHEIGHT, for a file that does not state it.")
     ] = None,
     frame: Annotated[
         list[str] | None,

@@ -51,7 +51,7 @@ def import_(
         bool | None,
         typer.Option(
             "--inverted/--not-inverted",
-            help="The poses are flange_from_base; where nothing is said, the pictures are asked.",
+            help="The poses are flange_from_base; where nothing is given, the pictures decide.",
         ),
     ] = None,
     mount: Annotated[

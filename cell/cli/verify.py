@@ -28,7 +28,7 @@ def verify(
         bool, typer.Option("--dry-run", help="Simulated arm and camera in place of the real ones.")
     ] = False,
     views: Annotated[
-        int, typer.Option(help="How many of the plan's views to take: those that tell most.")
+        int, typer.Option(help="How many of the plan's views to take: the most informative ones.")
     ] = 8,
     length_m: Annotated[
         float | None,
@@ -44,7 +44,7 @@ def verify(
         float | None,
         typer.Option(
             help="Error at the work piece that matters: what changed by less is still good, and a"
-            " check that could overlook more cannot tell. Without it any change counts that is more"
+            " check that could overlook more is undecided. Without it any change counts that is more"
             " than chance, and the check must be able to notice 1 mm.",
         ),
     ] = None,

@@ -196,7 +196,7 @@ class ReadingWatch:
             and float(turned) < _FROZEN_SHARE * slowest_rad_s * elapsed_s
         ):
             raise SafetyError(
-                f"the arm's readings cannot be: they told of {slowest_rad_s:.2f} rad/s for"
+                f"the arm's readings cannot be: they report {slowest_rad_s:.2f} rad/s for"
                 f" {elapsed_s:.2f} s and of no way. They are old, and nothing moves on them."
             )
 

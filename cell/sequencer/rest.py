@@ -55,7 +55,7 @@ class RestEvidence:
             self._disprove("the readings say that it still moves", fresh=True)
             return False
         self._anchor, self.fresh = self._anchor or state, True
-        self.missing = "the readings have not said for long enough that it stands"
+        self.missing = "the readings have not shown for long enough that it stands"
         return _elapsed_s(self._anchor, state) >= REST_S
 
     @property

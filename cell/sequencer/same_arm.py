@@ -75,7 +75,7 @@ def check_same_arm(arm: ArmKinematics, state: ArmState) -> None:
         return
     if len(state.joints_rad) != len(arm.dh):
         raise InputError(
-            f"the controller tells {len(state.joints_rad)} joints, robot.model {arm.name} has"
+            f"the controller reports {len(state.joints_rad)} joints, robot.model {arm.name} has"
             f" {len(arm.dh)}"
         )
     found = flange_difference(arm, np.array(state.joints_rad), state.base_from_flange)

@@ -233,5 +233,5 @@ class WatchedArm:
 def joints_of(state: ArmState) -> FloatArray:
     """(6,) joint angles; raises `DeviceError` for an arm that does not tell them."""
     if state.joints_rad is None:
-        raise DeviceError("the arm does not tell its joint angles; a run cannot be checked")
+        raise DeviceError("the arm does not report its joint angles; a run cannot be checked")
     return np.asarray(state.joints_rad, dtype=float)

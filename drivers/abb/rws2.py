@@ -185,7 +185,7 @@ class Rws2:
     def _first(self, path: str) -> dict[str, Any]:
         states = self._states(path)
         if not states:
-            raise Rws2Refused(f"/{path} tells nothing", 0)
+            raise Rws2Refused(f"/{path} reports nothing", 0)
         return states[0]
 
     def _states(self, path: str) -> list[dict[str, Any]]:

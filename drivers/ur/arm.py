@@ -184,7 +184,7 @@ class URArm:
         if self.kinematics is None:
             _log.warning(
                 self._named(
-                    "tells no kinematics on port 30001, so joint moves are slowed down as if the "
+                    "reports no kinematics on port 30001, so joint moves are slowed down as if the "
                     "arm were stretched out"
                 )
             )

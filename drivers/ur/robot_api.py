@@ -107,7 +107,7 @@ class RobotApi:
 
     def _mode(self, path: str) -> str:
         mode = self._get(path).get("mode")
-        return printable(mode) if isinstance(mode, str) else "not told"
+        return printable(mode) if isinstance(mode, str) else "not reported"
 
     def _get(self, path: str) -> dict[str, Any]:
         """The answer to a question; empty where this version does not know it."""

@@ -164,7 +164,7 @@ def test_an_arm_that_never_stops_gives_moving_frames(
     result, recording = _imported(bag, tmp_path / "out", *options)
     assert recording.header.capture.mode == "moving"
     assert "capture: moving" in _says(result, "stood still")
-    assert "-35.0 ms are added as said" in _says(result, "clock")
+    assert "-35.0 ms are added as stated" in _says(result, "clock")
     # 20 ms between transforms of an arm that accelerates
     np.testing.assert_allclose(_poses(recording), tour.flange(_taken(some)), atol=5e-4)
 

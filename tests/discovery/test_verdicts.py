@@ -124,15 +124,15 @@ def test_joints_that_were_not_logged_are_worked_out_and_that_is_said():
     bare = without("joints_rad", "joint_velocity_rad_s", "approach_joints_rad")
     repaired = repair_log(bare, bare)
     assert np.isfinite(repaired.views.joints_rad).all()
-    assert "joints" in " ".join(repaired.output)
+    assert "joints" in " ".join(repaired.notes)
 
 
 def test_without_times_what_drifts_is_said_to_be_out_of_sight():
     found = diagnose(without("t_s", "temperature_c"))
     assert found.verdict == "consistent"
-    output = " ".join(found.output)
-    assert "t_s was not logged" in output
-    assert "thermal_focal_drift" in output
+    notes = " ".join(found.notes)
+    assert "t_s was not logged" in notes
+    assert "thermal_focal_drift" in notes
 
 
 def test_without_poses_the_board_can_still_be_judged():
@@ -146,5 +146,5 @@ def test_without_poses_the_board_can_still_be_judged():
         robot_model=None,
     )
     found = diagnose(unheard)
-    assert "no robot poses" in " ".join(found.output)
+    assert "no robot poses" in " ".join(found.notes)
     assert names(found) == {"board_warp"}

@@ -138,7 +138,7 @@ def test_a_distance_without_a_focal_length_is_refused(distance_m: float, tmp_pat
 
 def test_an_older_file_without_the_image_s_size_is_told_apart(tmp_path: Path) -> None:
     content = {key: value for key, value in STILL.items() if key != "image_size_px"}
-    with pytest.raises(InputError, match="does not tell the image's size"):
+    with pytest.raises(InputError, match="does not state the image's size"):
         _export(tmp_path, content, "kalibr")
     size = (1279, 724)
     assert "resolution: [1279, 724]" in _export(tmp_path, content, "kalibr", image_size_px=size)

@@ -158,7 +158,7 @@ class SolutionPart(ResultPart):
     tilt_x_rad: float = 0.0
     tilt_y_rad: float = 0.0
     at_distance_m: float | None
-    """Where alpha and beta move with distance: the distance they are told at."""
+    """Where alpha and beta move with distance: the distance they are given at."""
     focus: FocusPart | None = None
     sigma: dict[str, Sigma]
     covariance: CovariancePart | None = None

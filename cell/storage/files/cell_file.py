@@ -54,7 +54,7 @@ class SimulatedRobot(Part):
     urdf: Path | None = None
     """Description of any other six-joint arm; relative to this file."""
     base: str = "base_link"
-    """Link of `urdf` whose frame poses are told in; `base` for a Universal Robot."""
+    """Link of `urdf` whose frame poses are given in; `base` for a Universal Robot."""
     flange: str = "tool0"
     """Link of `urdf` that is the tool flange."""
     payload_kg: float = Field(default=0.0, ge=0)

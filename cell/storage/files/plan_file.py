@@ -80,7 +80,7 @@ class Settle(Part):
     """When the arm stands still: judged from its own state."""
 
     still_s: float = Field(default=0.1, ge=0, le=DURATION_S)
-    """It must have told so for this long without a break."""
+    """It must have reported so for this long without a break."""
     timeout_s: Duration = 10.0
     """Longer than this after the move, and the view is given up."""
 

@@ -70,7 +70,7 @@ class NearGuard(Guard):
         except SafetyError as refusal:
             raise SafetyError(
                 f"{refusal} What hangs on the flange is taken larger by what the layout may be"
-                " off; drive the arm away by hand, or tell a better known layout."
+                " off; drive the arm away by hand, or give a better known layout."
             ) from None
 
     def check_move(self, start_rad: FloatArray, end_rad: FloatArray, where: str) -> None:

@@ -128,7 +128,7 @@ def _notes(a: Side, b: Side, mounted: Difference | None) -> tuple[str, ...]:
     ]
     notes += [
         f"{side.label}: its own frames ask for up to {side.too_sure:.1f} times the uncertainty it"
-        " states (cross-validation): chance makes more than is told here"
+        " states (cross-validation): chance makes more than is stated here"
         for side in (a, b)
         if side.too_sure > 1.0
     ]

@@ -51,7 +51,7 @@ def _map(comparison: Comparison, part: Difference, title: str) -> str:
     return drawing(
         lambda: draw(comparison, part),
         f"{title}: pixels of B minus A over the image, nearest and farthest distance. Arrows are "
-        "drawn to a scale of their own in each map; the shade tells the length.",
+        "drawn to a scale of their own in each map; the shade shows the length.",
         "",
     )
 

@@ -117,7 +117,7 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
     """
     if calibration.image_size_px is None or calibration.range_m is None:
         raise InputError(
-            f"{label}: does not tell the image's size and distances: it was written by an older"
+            f"{label}: does not state the image's size and distances: it was written by an older"
             " version. Run cell calibrate anew"
         )
     name, zones = calibration.recommended(), calibration.zones

@@ -39,7 +39,9 @@ def _held(address: str) -> Finding:
     try:
         status, answer = _ask(address, _READ_REGISTER, struct.pack(">I", _CONTROL_PRIVILEGE))
     except OSError as silent:
-        return Finding("GigE control", False, f"does not tell ({silent})", CHECK_LINE, needed=False)
+        return Finding(
+            "GigE control", False, f"does not report it ({silent})", CHECK_LINE, needed=False
+        )
     held = status == _ACCESS_DENIED or bool(int.from_bytes(answer[:4], "big") & _CONTROL_BITS)
     return Finding(
         "GigE control",

@@ -50,7 +50,7 @@ def _panel(robot: UniversalRobot) -> list[Finding]:
         found = ", ".join(
             reported[key] for key in ("polyscope", "model", "serial") if key in reported
         )
-        answers = Finding("UR controller", True, f"{kind}: {found or 'tells no version'}")
+        answers = Finding("UR controller", True, f"{kind}: {found or 'reports no version'}")
         return [answers, _model(robot.model or "", reported.get("model", "")), *_state(panel)]
     except DeviceError as silent:
         return [Finding("UR controller", False, str(silent), CHECK_LINE)]
@@ -174,7 +174,7 @@ def _tool(packet: Packet) -> Finding:
         "UR tool centre point",
         bool(length_m <= _LONGEST_TOOL_M),
         f"{x:.1f} {y:.1f} {z:.1f} mm from the flange; it is taken out of every pose",
-        "a tool longer than a metre is a slip of units: correct it at the pendant, Installation,"
+        "a tool longer than a metre is a mistake of units: correct it at the pendant, Installation,"
         " TCP",
     )
 
@@ -194,6 +194,6 @@ def _clock(heard: list[Packet]) -> Finding:
         f"{offset_s.min():+.3f} s from this computer's, packets up to {1e3 * slip_s:.1f} ms late"
         f" in {host[-1] - host[0]:.1f} s",
         "take the load off this computer, or give robot and camera a network of their own; poses"
-        " are told late, which a run with `capture: moving` cannot bear",
+        " are reported late, which a run with `capture: moving` cannot bear",
         needed=False,
     )

@@ -50,7 +50,7 @@ class Camera:
         """(width, height); raises `InputError` where nothing tells, naming the tool in need."""
         if self.image_size_px is None:
             raise InputError(
-                f"the calibration does not tell the image's size, which {tool} needs: say"
+                f"the calibration does not state the image's size, which {tool} needs: say"
                 " --image-size WIDTHxHEIGHT, or run cell calibrate anew"
             )
         return self.image_size_px

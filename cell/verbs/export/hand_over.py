@@ -91,7 +91,7 @@ def export_calibration(
     solution:
         Name of the solution; the recommended one where None.
     image_size_px:
-        (width, height) for a file that does not tell.
+        (width, height) for a file that does not state it.
     frames:
         Names of `FRAMES` in the reader's tool, for the formats of `POSES`.
     views:

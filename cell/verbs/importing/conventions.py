@@ -240,7 +240,7 @@ def _by_pictures(
     if not measured[order[0]].good:
         best = measured[order[0]]
         if stated.rotation is not None:
-            return best, (), (f"the poses as said agree with the pictures only to {best.off}",)
+            return best, (), (f"the poses as stated agree with the pictures only to {best.off}",)
         raise InputError(_contradicted(best, [r.rotation for r in measured]))
     rivals = [measured[k] for k in close]
     if any(rival.rotation != best.rotation for rival in rivals):

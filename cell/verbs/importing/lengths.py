@@ -58,11 +58,11 @@ def unit_of(
             " them again"
         )
     if stated is not None:
-        return Lengths(stated, "as said", _against(stated, factor, square_m))
+        return Lengths(stated, "as stated", _against(stated, factor, square_m))
     farthest = float(np.abs(places).max())
     if factor is None:
         if named is not None:
-            return Lengths(named, "as their names tell")
+            return Lengths(named, "as their names say")
         return Lengths(
             "mm" if farthest > _FARTHEST_M else "m", f"as the largest coordinate is {farthest:.4g}"
         )

@@ -28,7 +28,7 @@ def assumed_noise(cell: CellFile) -> tuple[Noise, str]:
     """Noise levels to plan with, and where they are from."""
     reported = cell.simulation.noise if cell.simulation else None
     if reported is None:
-        return USUAL_NOISE, "assumed; the cell file does not tell"
+        return USUAL_NOISE, "assumed; the cell file does not state it"
     noise = Noise(
         corner_px=reported.corner_px or USUAL_NOISE.corner_px,
         flange_m=reported.arm_position_m or USUAL_NOISE.flange_m,

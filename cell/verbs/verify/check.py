@@ -147,7 +147,7 @@ def _nothing(calibration: str, recording: str, why: str, left_out: dict[int, str
         calibration=calibration,
         recording=recording,
         verdict="cannot_tell",
-        sentence=f"Whether the calibration still holds cannot be told: {why}.",
+        sentence=f"Whether the calibration still holds cannot be decided: {why}.",
         p_value=None,
         frames_used=(),
         frames_left_out=tuple(LeftOutPart(frame=f, reason=r) for f, r in left_out.items()),

@@ -147,7 +147,7 @@ def test_the_factory_kinematics_are_read_and_put_the_flange_where_the_controller
         assert read_kinematics(controller.address, timeout_s=0.3) is None
 
 
-@pytest.mark.parametrize("reported", [True, False], ids=["kinematics told", "not told"])
+@pytest.mark.parametrize("reported", [True, False], ids=["kinematics reported", "not reported"])
 def test_the_flange_never_exceeds_its_speed_in_a_joint_move(reported):
     with ur_peer() as (controller, sim):
         controller.kinematics = controller.kinematics if reported else None

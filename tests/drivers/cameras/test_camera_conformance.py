@@ -56,7 +56,9 @@ def test_what_is_set_is_read_back_and_stands_in_the_frame(
 ) -> None:
     key = {"exposure": "exposure_s", "gain": "gain_db"}[name]
     if name not in rig.can:
-        with pytest.raises(DeviceRefused, match=r"no exposure|no gain|does not tell its settings"):
+        with pytest.raises(
+            DeviceRefused, match=r"no exposure|no gain|does not report its settings"
+        ):
             rig.camera.configure(**{key: values[0]})
         assert getattr(rig.camera.grab(TIMEOUT_S), key) is None
         return

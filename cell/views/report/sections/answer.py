@@ -38,7 +38,7 @@ def answer(data: ReportData) -> str:
         "board's size that was located by one picture. Each mark is a frame, lines are the RMS "
         "over a range of distances; dashed what the calibration as a whole may be off by (two "
         "sigma), dotted the answer, which holds both.",
-        f"The error at the work piece is not known: {_no_error(found) or 'nothing tells it'}.",
+        f"The error at the work piece is not known: {_no_error(found) or 'nothing shows it'}.",
     )
     return (
         f'<section id="answer">{_banner(data)}<h1>{html.text(_title(data))}</h1>'

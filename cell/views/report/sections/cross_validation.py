@@ -38,7 +38,7 @@ def cross_validation_sentences(data: ReportData) -> Iterator[str]:
 def cross_validation(calibration: Mapping[str, Any]) -> str:
     """The verdict, what the folds move, what frames held out are missed by, and single frames."""
     found = calibration.get("cross_validation")
-    heading = "<h3>Would other frames have said the same?</h3>"
+    heading = "<h3>Would other frames have given the same?</h3>"
     if not found:
         reason = (calibration.get("missing") or {}).get("cross_validation", "no joint fit")
         return heading + html.missing(f"Not cross-validated: {reason}.")

@@ -114,10 +114,10 @@ def _map(found: Mapping[str, Any], sigma_m: np.ndarray[Any, np.dtype[np.float64]
 def _not_separable(calibration: Mapping[str, Any]) -> str:
     found = calibration.get("not_separable")
     if found is None:
-        return html.missing("Whether the views tell everything apart was not worked out.")
+        return html.missing("Whether the views determine everything was not worked out.")
     if not found:
         if not (calibration.get("robot") or {}).get("source"):
-            return html.missing("Without a joint fit nothing is said of what goes together.")
+            return html.missing("Without a joint fit it is not known what goes together.")
         return html.paragraph("The views tell all fitted quantities apart.")
     head = ("hardly told apart", "times worse than each alone", "record as well",
             "four such views help")  # fmt: skip
