@@ -44,7 +44,7 @@ def verify(
         float | None,
         typer.Option(
             help="Error at the work piece that matters: what changed by less is still good, and a"
-            " check that could overlook more is undecided. Without it any change counts that is more"
+            " check that could overlook more cannot say. Without it any change counts that is more"
             " than chance, and the check must be able to notice 1 mm.",
         ),
     ] = None,

@@ -205,7 +205,7 @@ def test_what_is_missing_is_said(tmp_path: Path) -> None:
         import_source(tmp_path / "nowhere", tmp_path / "r", Described())
     with pytest.raises(InputError, match="has no pictures"):
         import_source(tmp_path, tmp_path / "r", Described(board=BOARD))
-    with pytest.raises(InputError, match="the board is not given"):
+    with pytest.raises(InputError, match="no board: give"):
         import_source(pictures(tmp_path / "source"), tmp_path / "r", Described())
 
 

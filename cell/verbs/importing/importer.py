@@ -99,7 +99,7 @@ def _import_pictures(
     pictures, notes = pictures_in(source)
     if described.board is None:
         raise InputError(
-            "the board is not given: give --board ROWSxCOLSxSQUARE in inner corners and metres, such"
+            "no board: give --board ROWSxCOLSxSQUARE in inner corners and metres, such"
             " as --board 6x9x0.025"
         )
     series = _series(described)

@@ -66,7 +66,7 @@ def import_bag(
     """
     if described.board is None:
         raise InputError(
-            "the board is not given: give --board ROWSxCOLSxSQUARE in inner corners and metres, such"
+            "no board: give --board ROWSxCOLSxSQUARE in inner corners and metres, such"
             " as --board 6x9x0.025"
         )
     stated = described.bag
