@@ -16,6 +16,7 @@ from cell.sequencer.bounded import check_bounded
 from cell.storage.files.cell_file import read_cell
 from cell.verbs.init.answers import HOMES_DEG, Answers
 from cell.verbs.init.cell_text import cell_of
+from cell.verbs.plan.shortfall import why_not
 from drivers.errors import SafetyError
 from tests.cell.test_cli import Cell
 from tests.cell.test_cli import cell as cell  # a fixture
@@ -82,6 +83,9 @@ def test_a_real_arm_is_asked_for_what_it_could_run_into(cell: Cell, tmp_path: Pa
     assert made.workspace.low_m == (-0.9, -0.9, 0.0)
     assert made.keep_out[0].name == "post"
     assert made.robot.payload_kg == 0.8
+    assert made.layout is not None
+    assert made.layout.fixed.p_m[2] >= -1e-6, "on the table, not below it"
+    assert "not in view from home" not in why_not(made)
 
 
 def test_nothing_to_keep_out_is_an_answer_and_silence_is_none(cell: Cell, tmp_path: Path) -> None:
@@ -100,6 +104,7 @@ def test_nothing_to_keep_out_is_an_answer_and_silence_is_none(cell: Cell, tmp_pa
         (("--board-at", "0,0,0"), "must be 6 numbers"),
         (("--focal-length-mm", "200"), "take a smaller board or a shorter lens"),
         (("--model", "ur99"), "is not known; known are"),
+        (("--model", "ur3e", "--workspace", "-1,-1,0,1,1,1"), "take a smaller board or a shorter"),
         (("--robot", "abb"), "--model is needed"),
     ],
 )

@@ -8,11 +8,12 @@ from typing import Any, Literal
 
 from calib.mount import Mount
 
-HOMES_DEG: Mapping[str, tuple[float, ...]] = {
-    "ur": (0.0, -90.0, -100.0, -80.0, 90.0, 0.0),
-    "irb": (0.0, 0.0, 10.0, 0.0, 80.0, 0.0),
+HOMES_DEG: Mapping[str, tuple[tuple[float, ...], ...]] = {
+    "ur": ((0.0, -90.0, -100.0, -80.0, 90.0, 0.0), (0.0, -90.0, -60.0, -120.0, 90.0, 0.0)),
+    "irb": ((0.0, 0.0, 10.0, 0.0, 80.0, 0.0), (0.0, 0.0, -10.0, 0.0, 100.0, 0.0)),
 }
-"""A posture with the flange facing down and room around it, by the first letters of the model."""
+"""Postures with the flange facing down and room around it, the lower one first, by the first
+letters of the model."""
 
 RobotDriver = Literal["sim", "ur", "abb"]
 CameraDriver = Literal["sim", "gige", "genicam", "robotiq"]

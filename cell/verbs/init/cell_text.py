@@ -37,8 +37,8 @@ def cell_of(answers: Answers) -> CellFile:
     InputError
         An answer cannot be, or the board would not be where the arm can look at it.
     """
-    home = answers.home_deg or _home(answers.model)
     distances = answers.distances_m or _distances(answers)
+    home, away_m = _home_and_distance(answers, distances)
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "name": answers.name,
@@ -50,7 +50,7 @@ def cell_of(answers: Answers) -> CellFile:
             "mounted": _pose(answers.camera_at),
             "fixed": _pose(answers.board_at)
             if answers.board_at is not None
-            else _seen_from_home(answers, home, float(np.mean(distances))),
+            else _seen_from_home(answers, home, away_m),
             "home_deg": list(home),
             "distances_m": list(distances),
         },
@@ -80,13 +80,43 @@ def write_cell(cell: CellFile, folder: Path) -> Path:
     return path
 
 
-def _home(model: str) -> tuple[float, ...]:
-    for letters, home in HOMES_DEG.items():
-        if model.startswith(letters):
-            return home
+def _home_and_distance(
+    answers: Answers, distances_m: tuple[float, float]
+) -> tuple[tuple[float, ...], float]:
+    """A home posture, and how far from the camera the board lies there.
+
+    In the middle of the distances; nearer where it would lie below the workspace, on a table say.
+    """
+    near, middle = distances_m[0], float(np.mean(distances_m))
+    homes = (answers.home_deg,) if answers.home_deg is not None else _homes(answers.model)
+    if answers.workspace is None or answers.mount == "eye_to_hand":
+        return homes[0], middle
+    lowest = min(answers.workspace[2], answers.workspace[5])
+    away = 0.0
+    for home in homes:
+        camera = _flange(answers.model, home) * _transform(answers.camera_at)
+        away = float(camera.translation[2]) - lowest
+        if away >= near or answers.board_at is not None:
+            return home, min(middle, away)
     raise InputError(
-        f"--model {model}: has no usual posture here; give --home with six angles in degrees"
+        f"at home the camera is {away:.2f} m above the workspace's lowest height, and this lens"
+        f" shows the board whole from {near:.2f} m on: take a smaller board or a shorter lens, or"
+        " say where the board lies (--board-at) and where the arm looks from (--home)"
     )
+
+
+def _homes(model: str) -> tuple[tuple[float, ...], ...]:
+    for letters, homes in HOMES_DEG.items():
+        if model.startswith(letters):
+            return homes
+    raise InputError(f"--model {model}: has no usual posture here; give --home, six degrees")
+
+
+def _flange(model: str, home_deg: tuple[float, ...]) -> RigidTransform:
+    try:
+        return RigidTransform.from_matrix(arm(model).forward(np.radians(home_deg)))
+    except UnknownArm as fault:
+        raise InputError(f"--model {model}: {fault}") from None
 
 
 def _robot(answers: Answers) -> dict[str, Any]:
@@ -174,10 +204,7 @@ def _pose(numbers: tuple[float, ...]) -> dict[str, Any]:
 
 def _seen_from_home(answers: Answers, home: tuple[float, ...], distance_m: float) -> dict[str, Any]:
     """base_from_fixed with the board's middle straight before the camera at home, square to it."""
-    try:
-        flange = RigidTransform.from_matrix(arm(answers.model).forward(np.radians(home)))
-    except UnknownArm as fault:
-        raise InputError(f"--model {answers.model}: {fault}") from None
+    flange = _flange(answers.model, home)
     rows, cols = _corners(answers)
     square = answers.board["square_m"]
     middle = np.array([(cols - 1) * square / 2, (rows - 1) * square / 2, 0.0])
