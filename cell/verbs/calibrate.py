@@ -14,7 +14,7 @@ from calib.errors import CalibrationError
 from calib.views import Views
 from cell.errors import BadAnswer
 from cell.storage.files.calibration_file import CalibrationFile
-from cell.storage.files.provenance import made_by
+from cell.storage.files.provenance import provenance
 from cell.storage.files.results import results_folder, write_results
 from cell.storage.recording import Corners, Recording, write_corners
 from cell.storage.recording.detect import Progress, corners_of
@@ -88,8 +88,9 @@ def calibrate_recording(
         # rows that repeat another's are no poses of their own; the rest of the log may well do
         views = stale.mend(views, views)
         result = calibrate(views)
-    mapping = as_mapping(result, recording.name) | made_by()
-    mapping |= _devices(recording, mapping["robot"])
+    mapping = as_mapping(result, recording.name)
+    origin = provenance(recording.header.as_mapping())
+    mapping |= origin | {"robot": origin["robot"] | mapping["robot"]}
     mapping["warnings"] = mixup_warnings(mixups) + mapping["warnings"]
     for rejection in mapping["frames_rejected"]:
         rejection["reason"] = corners.rejected.get(rejection["frame"], rejection["reason"])
@@ -97,16 +98,6 @@ def calibrate_recording(
     mapping["answer"] = work_out(report_data(recording, calibrated))
     checked = CalibrationFile.model_validate(mapping)
     return replace(calibrated, mapping=checked.model_dump(mode="json", by_alias=True))
-
-
-def _devices(recording: Recording, robot: dict[str, Any]) -> dict[str, Any]:
-    """Which camera and robot, with what a fit said of it, and when they recorded."""
-    header = recording.header.as_mapping()
-    return {
-        "recorded": header.get("created"),
-        "camera": {key: header["camera"].get(key) for key in ("model", "serial")},
-        "robot": {key: header["robot"].get(key) for key in ("model", "serial")} | robot,
-    }
 
 
 def _first_reasons(corners: Corners) -> str:

@@ -90,6 +90,8 @@ def test_every_reference_inside_the_page_has_its_target(tmp_path: Path) -> None:
     [
         "SIMULATED",
         "robotiq_wrist on the flange of ur5e",
+        "Recorded 2026-11-29T13:00:00+01:00; camera robotiq_wrist (serial 4711), robot ur5e (serial"
+        " not known). This result: 2026-11-29T14:00:00+01:00, by calibration-cell 0.1.0.",
         "1370.83 ± 0.22 px",  # alpha of the recommended solution
         "1373.11 ± 0.21 px",  # alpha0 of the focus law
         "5.980 ± 0.050 px·m²",

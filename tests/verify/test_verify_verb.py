@@ -53,6 +53,11 @@ def test_a_recording_that_agrees_leaves_with_0(
     assert abs(output["length"]["error_m"]) < 4 * output["length"]["sigma_m"]
     written = json.loads((bench / "same/verify/verify.json").read_text())
     assert written == output
+    assert written["program"].startswith("calibration-cell ")
+    assert {"recorded", "created", "camera", "robot"} <= set(written)
+    assert written["robot"]["model"] == "ur3"
+    page = (bench / "same/verify/verify.html").read_text()
+    assert f"This result: {written['created']}, by {written['program']}." in page
     schema = json.loads((FOLDER / "verify.schema.json").read_text())
     jsonschema.validate(written, schema)
     assert (bench / "same/verify/verify.html").stat().st_size > 50_000

@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
+from cell.storage.files.provenance_part import ProvenancePart
 from cell.storage.files.result_part import ResultPart
 
 SCHEMA: Final = "cell.diagnosis/1"
@@ -145,7 +146,7 @@ class NoisePart(ResultPart):
     """Scatter of the focal length frame by frame, as a share of it; zero where none is needed."""
 
 
-class DiagnosisFile(ResultPart):
+class DiagnosisFile(ProvenancePart):
     """The whole of diagnosis.json."""
 
     schema_: Literal["cell.diagnosis/1"] = Field(default=SCHEMA, alias="schema")

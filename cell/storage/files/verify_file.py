@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import ConfigDict, Field, PositiveFloat
 
+from cell.storage.files.provenance_part import ProvenancePart
 from cell.storage.files.result_part import ResultPart
 
 SCHEMA: Final = "cell.verify/1"
@@ -143,7 +144,7 @@ Verdict = Literal[
 ]
 
 
-class VerifyFile(ResultPart):
+class VerifyFile(ProvenancePart):
     """The whole of `verify.json`; metres, radians, pixels."""
 
     model_config = ConfigDict(

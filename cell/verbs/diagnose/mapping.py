@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from calib.discovery.diagnosis import Ambiguity, Diagnosis, FoundLaw, NamedEffect, Unexplained
@@ -17,13 +17,18 @@ def as_mapping(
     recording: str,
     separations: Sequence[Separation],
     notes: Sequence[str] = (),
+    origin: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """The content of `diagnosis.json`, checked against its model; `notes` go behind its own."""
+    """The content of `diagnosis.json`, checked against its model; `notes` go behind its own.
+
+    `origin` is its `provenance`, where it is of a recording.
+    """
     noise = found.twin.noise
     heard = noise.flange_m < UNKNOWN_POSE[0]
     content = {
         "schema": SCHEMA,
         "recording": recording,
+        **(origin or {}),
         "verdict": found.verdict,
         "holdout": None if found.proof is None else vars(found.proof),
         "misfit": {"before": vars(found.split[0]), "after": vars(found.split[1])},

@@ -19,6 +19,7 @@ from calib.discovery.diagnosis import Diagnosis
 from calib.errors import CalibrationError
 from calib.views import Views
 from cell.errors import BadAnswer, InputError
+from cell.storage.files.provenance import provenance
 from cell.storage.files.results import results_folder, write_results
 from cell.storage.recording import Corners, Recording, frames_as_views, read_frames
 from cell.storage.recording.detect import Progress, corners_of
@@ -96,7 +97,8 @@ def diagnose_into(
         raise BadAnswer(f"{recording.path}: {error}") from None
     plans = separations(found, recording)
     notes = brightness_notes(recording, found)
-    mapping = as_mapping(found, recording.name, plans, notes)
+    origin = provenance(recording.header.as_mapping())
+    mapping = as_mapping(found, recording.name, plans, notes, origin)
     write_results(folder, {DIAGNOSIS: json.dumps(mapping, indent=1) + "\n"})
     write_results(folder, {TWIN: twin_text(found, recording)})
     write_results(folder, {plan.file: plan.text for plan in plans if plan.file is not None})

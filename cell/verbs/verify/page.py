@@ -19,6 +19,7 @@ from cell.verbs.verify.messages import (
     image_rows,
 )
 from cell.verbs.verify.misfit import Misfit
+from cell.views.provenance_text import provenance_text
 from cell.views.report import html
 from cell.views.report.figures.canvas import BLACK
 from cell.views.report.plot import Figure, panels
@@ -40,6 +41,7 @@ def render(checked: Checked, *, simulated: bool) -> str:
     title = f"Is the calibration of {html.text(found.recording)} still good?"
     first = (
         f'<section id="answer">{banner}<h1>{title}</h1>{html.paragraph(found.sentence, "lead")}'
+        f"{html.paragraph(provenance_text(found.model_dump(mode='json')), 'small')}"
         f'<div class="cards">{_cards(found)}</div>{html.bullets(found.notes)}</section>'
     )
     return (

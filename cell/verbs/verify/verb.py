@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from calib.detection.same_order import same_order_everywhere
 from cell.errors import InputError
 from cell.storage.files.calibration_place import calibration_file
 from cell.storage.files.calibration_source import read_calibration
+from cell.storage.files.provenance import provenance
 from cell.storage.files.results import write_results
 from cell.storage.files.verify_file import VerifyFile
 from cell.storage.recording import Recording
@@ -82,6 +83,10 @@ def verify_into(
         tolerance_m=tolerance_m,
         left_out=dict(corners.rejected),
     )
+    origin = VerifyFile.model_validate(
+        checked.content.model_dump(by_alias=True) | provenance(recording.header.as_mapping())
+    )
+    checked = replace(checked, content=origin)
     page = render(checked, simulated=recording.header.simulated)
     content = json.dumps(checked.content.model_dump(mode="json", by_alias=True), indent=1) + "\n"
     write_results(folder, {FILE_NAME: content, PAGE_NAME: page})

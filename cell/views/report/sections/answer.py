@@ -9,6 +9,7 @@ import numpy as np
 
 from cell.views.answer_text import answer_text
 from cell.views.numbers import UNKNOWN, known, millimetres, number, solution_name
+from cell.views.provenance_text import provenance_text
 from cell.views.report import html
 from cell.views.report.answer_values import answer_of, shared_by_distance
 from cell.views.report.data import ReportData
@@ -42,7 +43,7 @@ def answer(data: ReportData) -> str:
     )
     return (
         f'<section id="answer">{_banner(data)}<h1>{html.text(_title(data))}</h1>'
-        f"{html.paragraph(_sentence(data), 'lead')}"
+        f"{html.paragraph(_sentence(data), 'lead')}{_origin(data)}"
         f"{_warnings(data)}"
         f'<div class="cards">{_cards(data)}</div>'
         f"{transforms_section(data)}"
@@ -68,6 +69,12 @@ def verdict_text(data: ReportData) -> tuple[str, str, str]:
     if verdict in _VERDICTS:
         return _VERDICTS[verdict]
     return "Not diagnosed", "not searched for missing physics: run cell diagnose", ""
+
+
+def _origin(data: ReportData) -> str:
+    """When, of which devices and by which version: of the newest result that is shown."""
+    content = data.diagnosis or data.calibration
+    return "" if content is None else html.paragraph(provenance_text(content), "small")
 
 
 def _banner(data: ReportData) -> str:
