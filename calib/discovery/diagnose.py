@@ -21,7 +21,7 @@ from calib.discovery.diagnosis import (
     Verdict,
 )
 from calib.discovery.history import with_history
-from calib.discovery.laws.arm_field import is_arm_field, made_anew
+from calib.discovery.laws.arm_field import is_arm_field, made_anew, scatters_too_much
 from calib.discovery.laws.contest import begin_with_law, law_leads
 from calib.discovery.laws.found_law import found_law
 from calib.discovery.laws.surface_field import field_leads, fields_anew
@@ -220,7 +220,12 @@ def _diagnosis(
         views=repaired.views,
         log=repaired.log,
         rejected=repaired.rejected,
-        notes=(*repaired.notes, *_pictures(twin, repaired.views), *_unseen(repaired.views)),
+        notes=(
+            *repaired.notes,
+            *_scatter(twin, repaired.has_robot),
+            *_pictures(twin, repaired.views),
+            *_unseen(repaired.views),
+        ),
     )
 
 
@@ -364,6 +369,18 @@ def _excess(fit: JointFit) -> float:
     """Squared misfit, in units of the noise, above what noise alone makes."""
     square = profile(fit.equations, fit.noise).square_sum
     return max(square - (fit.equations.observations - fit.parameters), 1.0)
+
+
+def _scatter(twin: JointFit, has_robot: bool) -> tuple[str, ...]:
+    noise = twin.noise
+    if not has_robot or not scatters_too_much(twin):
+        return ()
+    return (
+        f"the arm's poses scatter by {1e3 * noise.flange_m:.2f} mm and"
+        f" {1e3 * noise.flange_rad:.2f} mrad per axis, more than an industrial arm does about a"
+        " pose it returns to (ISO 9283: 0.01 to 0.1 mm); nothing says what these errors follow."
+        " More frames, closer to each other, would",
+    )
 
 
 def _pictures(twin: JointFit, views: Views) -> tuple[str, ...]:

@@ -9,9 +9,9 @@ import numpy as np
 from benchmarks.discovery.recordings import conceal
 from benchmarks.discovery.run import views_of
 from calib.chain.effects import make_effect
-from calib.chain.laws.arm_field import coordinates, present_field
+from calib.chain.laws.arm_field import coordinates, present_field, rms
 from calib.chain.model import predict
-from calib.discovery.laws.arm_field import find_arm_field
+from calib.discovery.laws.arm_field import find_arm_field, scatters_too_much
 from calib.discovery.laws.cross_validation import CrossValidation
 from calib.discovery.laws.frames import frame_blocks
 from calib.discovery.laws.review import drop_unsupported, replaced_by_laws
@@ -98,6 +98,19 @@ def test_an_arm_that_errs_smoothly_over_its_joints_is_told_and_a_sound_one_is_no
     found = find_arm_field(Fitter(views).fit(plain_cell(), NOISE), views)
     assert found is not None
     assert found.gain > 14.0
+    given = found.present.as_mapping()
+    assert abs(np.log(given["length_scale"] / 1.2)) < 1.0
+    assert 0.0 < given["length_scale_sigma"] < given["length_scale"]
+    assert 0.0 < given["share_sigma"] < 0.5
+    assert 0.0 < given["rms_sigma_m"] < 0.3 * rms(found.present)[0]
+
+
+def test_an_arm_that_scatters_much_without_a_pattern_makes_no_field():
+    loose = replace(NOISE, flange_m=6e-4, flange_rad=1.5e-3)
+    views = record(plain_cell(), LOG, 21, loose)
+    fit = Fitter(views).fit(plain_cell(), loose)
+    assert find_arm_field(fit, views) is None
+    assert scatters_too_much(fit)
     sound = record(plain_cell(), LOG, 20)
     assert find_arm_field(Fitter(sound).fit(plain_cell(), NOISE), sound) is None
 

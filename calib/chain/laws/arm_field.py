@@ -7,7 +7,7 @@ pose that was seen the field is nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -42,8 +42,17 @@ def likeness(first: FloatArray, second: FloatArray, length_scale: float) -> Floa
     return np.asarray(np.exp(-0.5 * square / length_scale**2))
 
 
+SIGMAS = ("length_scale_sigma", "share_sigma", "rms_sigma_m", "rms_sigma_rad")
+"""What is known of the field's uncertainty."""
+
+
 def present_field(
-    along: str, nodes: FloatArray, weights: FloatArray, length_scale: float, share: float
+    along: str,
+    nodes: FloatArray,
+    weights: FloatArray,
+    length_scale: float,
+    share: float,
+    sigmas: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
 ) -> Present:
     """The field as an effect whose amounts are given and not fitted.
 
@@ -57,8 +66,10 @@ def present_field(
         Over which errors are alike, as `coordinates` has it.
     share:
         Of the scatter's variance that the field takes up.
+    sigmas:
+        One sigma of what `SIGMAS` names.
     """
-    given = {"length_scale": length_scale, "share": share}
+    given = {"length_scale": length_scale, "share": share, **dict(zip(SIGMAS, sigmas, strict=True))}
     for k, (node, weight) in enumerate(zip(nodes, weights, strict=True)):
         given |= {f"node_{k}_{d}": float(value) for d, value in enumerate(node)}
         given |= {
@@ -109,6 +120,10 @@ def _effect(text: str, along: str, count: int, wide: int) -> Effect:
         parameters=(
             Parameter("length_scale", "rad", 0.5, 1e-3, 1e3, role="setting"),
             Parameter("share", "1", 0.5, 0.0, 1.0, role="setting"),
+            *(
+                Parameter(name, unit, 0.0, 0.0, 1e3, role="setting")
+                for name, unit in zip(SIGMAS, ("rad", "1", "m", "rad"), strict=True)
+            ),
             *(
                 Parameter(f"node_{k}_{d}", "rad", 1.0, -1e3, 1e3, role="setting")
                 for k in range(count)

@@ -31,7 +31,7 @@ _WORTH = 14.0
 
 _REPEATABLE_M, _REPEATABLE_RAD = 4e-4, 1e-3
 """No industrial arm scatters so much about a pose it returns to: ISO 9283 figures of arms up to
-2 m reach are 0.01 to 0.1 mm. What is more errs alike when it comes back."""
+2 m reach are 0.01 to 0.1 mm."""
 
 _FEWEST_FRAMES, _MOST_FRAMES = 12, 80
 """Of more frames every so many are compared: the field's size and length show in these."""
@@ -102,9 +102,32 @@ class _Scatter:
         weights = size * share * (solved[:, 0] - solved[:, 1:] @ step)
         return log_det + quadratic, weights.reshape(n, 6) * self.unit
 
+    def rms_sigma(
+        self, alike: FloatArray, share: float, size: float, weights: FloatArray
+    ) -> tuple[float, float]:
+        """Sigmas of the field's RMS over the recorded poses, metres and radians.
+
+        By the field's own posterior covariance; that of hand-eye and board is absorbed by these.
+        """
+        n, prior = len(self.places), size * share * alike
+        covariance = np.kron(prior + size * (1.0 - share) * np.eye(n), np.eye(6))
+        for k in range(n):
+            covariance[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] += self.noise[k]
+        whole = np.kron(prior, np.eye(6))
+        left = whole - whole @ cho_solve(cho_factor(covariance, lower=True), whole)
+        field = alike @ weights
+        sigma = []
+        for axes in (slice(0, 3), slice(3, 6)):
+            rms = float(np.sqrt((field[:, axes] ** 2).sum(axis=1).mean()))
+            slope = np.zeros((n, 6))
+            slope[:, axes] = field[:, axes] / (n * max(rms, 1e-300))
+            along = (slope * self.unit).ravel()
+            sigma.append(float(np.sqrt(max(along @ left @ along, 0.0))))
+        return sigma[0], sigma[1]
+
 
 def find_arm_field(fit: JointFit, views: Views) -> ArmField | None:
-    """The field that the arm's errors demand; None where they scatter freely, and little."""
+    """The field that the arm's errors demand; None where nothing says that they are alike."""
     if len(views) < _FEWEST_FRAMES or fit.own_error.shape[1] != 6:
         return None
     whole = _Scatter(fit, views)
@@ -117,25 +140,49 @@ def find_arm_field(fit: JointFit, views: Views) -> ArmField | None:
         for size in _SIZES
         for rest in [(length, share, size)]
     ]
-    too_much = fit.noise.flange_m > _REPEATABLE_M or fit.noise.flange_rad > _REPEATABLE_RAD
-    if min(tries)[0] > free - _WORTH:
-        if not too_much:
-            return None
-        tries = [one for one in tries if one[2] == max(_SHARES)]
     reached, length, share, size = min(tries)
-    return ArmField(_made(whole, views, length, share, size), free - reached)
+    if reached > free - _WORTH:
+        return None
+    loss = np.array([one[0] for one in tries])
+    sigmas = (
+        length * _sigma(loss, np.log([one[1] for one in tries]), np.log(_LENGTHS)),
+        _sigma(loss, np.array([one[2] for one in tries]), np.array(_SHARES)),
+    )
+    return ArmField(_made(whole, views, (length, share, size), sigmas), free - reached)
 
 
-def _made(scatter: _Scatter, views: Views, length: float, share: float, size: float) -> Present:
+def _sigma(loss: FloatArray, place: FloatArray, grid: FloatArray) -> float:
+    """Sigma of a number tried on a grid, from -2 log likelihood; no less than the grid resolves."""
+    weight = np.exp(-0.5 * (loss - loss.min()))
+    mean = np.average(place, weights=weight)
+    step = float(np.diff(grid).mean())
+    return float(np.sqrt(np.average((place - mean) ** 2, weights=weight) + step**2 / 12.0))
+
+
+def scatters_too_much(fit: JointFit) -> bool:
+    """Whether the arm seems to scatter more than any arm does about a pose it returns to."""
+    return fit.noise.flange_m > _REPEATABLE_M or fit.noise.flange_rad > _REPEATABLE_RAD
+
+
+def _made(
+    scatter: _Scatter,
+    views: Views,
+    numbers: tuple[float, float, float],
+    sigmas: tuple[float, float],
+) -> Present:
+    length, share, size = numbers
     alike = likeness(scatter.places, scatter.places, length)
     _, weights = scatter.judged(alike, share, size)
-    return present_field(over(views), scatter.places, weights, length, share)
+    rms_sigma = scatter.rms_sigma(alike, share, size, weights)
+    return present_field(over(views), scatter.places, weights, length, share, (*sigmas, *rms_sigma))
 
 
 def made_anew(fit: JointFit, views: Views, known: Present) -> Present:
     """The field of the same length scale and share for other frames, from a fit without it."""
     given = known.as_mapping()
-    return _made(_Scatter(fit, views), views, given["length_scale"], given["share"], 1.0)
+    numbers = (given["length_scale"], given["share"], 1.0)
+    sigmas = (given["length_scale_sigma"], given["share_sigma"])
+    return _made(_Scatter(fit, views), views, numbers, sigmas)
 
 
 def is_arm_field(present: Present) -> bool:
