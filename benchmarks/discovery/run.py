@@ -152,8 +152,12 @@ def without_names(names: tuple[str, ...]) -> Iterator[None]:
 def run(case: Case) -> Outcome:
     """Conceal, diagnose, judge."""
     physics = tuple((present(key), size) for key, size in case.physics)
-    concealed = conceal(case.name, physics, case.fault)
-    oracle = consult(concealed) if physics else Oracle(np.nan, np.nan, 0.0, 0)
+    return diagnosed(case, conceal(case.name, physics, case.fault))
+
+
+def diagnosed(case: Case, concealed: Concealed) -> Outcome:
+    """Diagnose what was concealed, and judge."""
+    oracle = consult(concealed) if case.physics else Oracle(np.nan, np.nan, 0.0, 0)
     rows = np.arange(len(concealed.ahead))
     started = time.process_time()
     try:

@@ -16,6 +16,7 @@ from calib.chain.model import CellModel
 from calib.detection.same_order import same_order_everywhere
 from calib.discovery.diagnose import diagnose
 from calib.discovery.diagnosis import Diagnosis
+from calib.discovery.laws.shape import law_shapes
 from calib.errors import CalibrationError
 from calib.views import Views
 from cell.errors import BadAnswer, InputError
@@ -157,6 +158,7 @@ def _report(
         corner_px=noise.corner_px,
         flange_m=noise.flange_m,
     )
+    evidence = replace(evidence, laws=law_shapes(found.twin, found.views))
     known = None if truth is None else simulation_truth(truth, data.views)
     data = replace(data, diagnosis=mapping, evidence=evidence, truth=known)
     write_report(folder / REPORT, data)

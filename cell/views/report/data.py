@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.discovery.laws.shape import LawShape
 from calib.views import FloatArray, Views
 from cell.storage.files.calibration_source import PREFERENCE
 
@@ -92,6 +93,8 @@ class Evidence:
     distance_m, gravity_in_camera, joints_rad:
         (N,) distance of the board's centre, (N, 3) unit vectors of gravity as the camera feels
         it, (N, J) joints, recovered where they were not logged.
+    laws:
+        Laws without a name, each over what it follows.
     """
 
     before_px: FloatArray | None = None
@@ -109,6 +112,7 @@ class Evidence:
     distance_m: FloatArray | None = None
     gravity_in_camera: FloatArray | None = None
     joints_rad: FloatArray | None = None
+    laws: tuple[LawShape, ...] = ()
 
 
 @dataclass(frozen=True)

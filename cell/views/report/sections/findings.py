@@ -17,7 +17,7 @@ from cell.views.numbers import (
 )
 from cell.views.report import html
 from cell.views.report.data import ReportData
-from cell.views.report.evidence import picture_of, remedy_of
+from cell.views.report.evidence import law, picture_of, remedy_of
 from cell.views.report.figures import proof
 from cell.views.report.sections.answer import verdict_text
 from cell.views.report.sections.drawing import drawing
@@ -35,7 +35,7 @@ def diagnosis_section(data: ReportData) -> str:
         html.paragraph(f"{meaning[0].upper()}{meaning[1:]}.", "lead"),
         _where(data),
         *(_effect(data, effect) for effect in data.diagnosis.get("effects") or []),
-        _unexplained(data.diagnosis),
+        _unexplained(data),
         _rivals(data.diagnosis),
         _holdout(data),
         _notes(data.diagnosis.get("notes") or []),
@@ -125,11 +125,11 @@ def _cost(data: ReportData, effect: Mapping[str, Any]) -> str:
     return f"{without}; {millimetres(_rms(found.shift_after_m))} with all that was found"
 
 
-def _unexplained(diagnosis: Mapping[str, Any]) -> str:
-    every = diagnosis.get("unexplained_all") or []
+def _unexplained(data: ReportData) -> str:
+    every = (data.diagnosis or {}).get("unexplained_all") or []
     if not every:
         return ""
-    reported = "".join(_without_a_name(left) for left in every)
+    reported = "".join(_without_a_name(data, left) for left in every)
     return f"<h3>What nobody can name</h3>{reported}"
 
 
@@ -142,8 +142,8 @@ _LOOK_AT = {
 }
 
 
-def _without_a_name(left: Mapping[str, Any]) -> str:
-    """A sentence, the law with its numbers, and what to look at on the machine."""
+def _without_a_name(data: ReportData, left: Mapping[str, Any]) -> str:
+    """A sentence, what to look at on the machine, the law with its numbers, and its picture."""
     place = f", {left['where']}" if left.get("where") else ""
     site, along = (str(left[key]).replace("_", " ") for key in ("site", "covariate"))
     words = (
@@ -151,22 +151,34 @@ def _without_a_name(left: Mapping[str, Any]) -> str:
         f"(p {probability(left.get('p_value'))}), and no known effect accounts for it. "
         f"Look at {_LOOK_AT.get(left['link'], left['link'])}, and at what changes with {along}."
     )
-    return html.paragraph(words, "bad-note") + _law(left.get("law"))
+    return html.paragraph(words, "bad-note") + _law(left.get("law")) + _law_picture(data, left)
 
 
-def _law(law: Mapping[str, Any] | None) -> str:
-    if not law:
+def _law_picture(data: ReportData, left: Mapping[str, Any]) -> str:
+    """The law over what it follows; of a field, what shows its link."""
+    figure = law.shape(data, left)
+    if figure is not None:
+        return html.figure(figure.svg(law.LOOK_FOR), law.LOOK_FOR)
+    link = picture_of({"name": "", "link": left["link"]})
+    if link is None:
         return ""
-    gain = law.get("holdout_gain_px")
+    shown = link.draw(data, {"name": "", "link": left["link"]})
+    return "" if shown is None else html.figure(shown.svg(link.look_for), link.look_for)
+
+
+def _law(found: Mapping[str, Any] | None) -> str:
+    if not found:
+        return ""
+    gain = found.get("holdout_gain_px")
     worth = "" if gain is None else f" Held-out frames are {gain:.2f} px worse without it."
-    rivals = law.get("rivals") or []
+    rivals = found.get("rivals") or []
     others = "" if not rivals else f" Not ruled out: {'; '.join(rivals)}."
     rows = [
         (name.replace("_", " "), f"{v['value']:.4g}", f"{v['sigma']:.2g}", v["unit"])
-        for name, v in law["parameters"].items()
+        for name, v in found["parameters"].items()
     ]
     table = html.table(("number", "value", "one sigma", "unit"), rows)
-    return html.paragraph(f"Law ({law['form']}): {law['equation']}.{worth}{others}") + table
+    return html.paragraph(f"Law ({found['form']}): {found['equation']}.{worth}{others}") + table
 
 
 def _rivals(diagnosis: Mapping[str, Any]) -> str:
