@@ -9,7 +9,7 @@ FAST := tests/chain/test_projection.py tests/chain/test_rigid.py tests/chain/tes
   tests/cell/test_session.py tests/cell/test_worker.py tests/docs/test_architecture.py
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help run test test-fast lint types layers docs setup clean
+.PHONY: help run demo-discovery test test-fast lint types layers docs setup clean
 setup: $(STAMP)  ## install into .venv
 
 help:  ## this list
@@ -24,6 +24,9 @@ $(STAMP): pyproject.toml tools/install-debian-packages
 
 run: $(STAMP)  ## the paper's larger cell, simulated, with its report
 	$(BIN)/cell run --dry-run
+
+demo-discovery: $(STAMP)  ## physics that no catalogue has, found as a law and predicted
+	$(BIN)/python -m benchmarks.discovery.demo
 
 test: $(STAMP) lint types layers docs  ## lint, types, layers, docs and every test
 	tools/install-debian-packages test

@@ -33,6 +33,9 @@ _REPEATABLE_M, _REPEATABLE_RAD = 4e-4, 1e-3
 """No industrial arm scatters so much about a pose it returns to: ISO 9283 figures of arms up to
 2 m reach are 0.01 to 0.1 mm."""
 
+_WORTH_BEYOND = 4.0
+"""The same where the arm scatters more than any does: that something is there need not be shown."""
+
 _FEWEST_FRAMES, _MOST_FRAMES = 12, 80
 """Of more frames every so many are compared: the field's size and length show in these."""
 
@@ -141,7 +144,7 @@ def find_arm_field(fit: JointFit, views: Views) -> ArmField | None:
         for rest in [(length, share, size)]
     ]
     reached, length, share, size = min(tries)
-    if reached > free - _WORTH:
+    if reached > free - (_WORTH_BEYOND if scatters_too_much(fit) else _WORTH):
         return None
     loss = np.array([one[0] for one in tries])
     sigmas = (
