@@ -32,7 +32,7 @@ from cell.storage.recording.recording import read_recording
 from cell.verbs.diagnose.verb import Diagnosed, diagnose_into
 from cell.verbs.simulate import simulated_views
 
-NAME, PHYSICS, SIZE = "demo 1", "bracket rocks thrice a turn of joint 6", 1.5
+NAME, PHYSICS, SIZE = "demo 1", "principal point follows gain", 1.5
 _LOGGED = ("t_s", "temperature_c", "exposure_s", "gain_db", "dwell_s", "clamp_N", "focus_step")
 
 
@@ -94,7 +94,7 @@ def main() -> None:
     started = time.process_time()
     case = conceal(NAME, ((present(PHYSICS), SIZE),), background=False)
     ahead = write(case, folder / "recording")
-    print(f"Concealed: {PHYSICS} ({SIZE:.1f} mrad), an effect that no catalogue has.")
+    print(f"Concealed: {PHYSICS} (0.4 px a dB, times {SIZE:g}), an effect that no catalogue has.")
     done = diagnose_into(read_recording(folder / "recording"), folder / "diagnosis", predict=ahead)
     print(f"Verdict:   {done.mapping['verdict']}; names: "
           f"{', '.join(e.name for e in done.found.effects) or 'none'}.")  # fmt: skip
