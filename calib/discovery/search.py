@@ -295,6 +295,10 @@ class Search:
         self._settle(fit)
         return self.best.fit
 
+    def criterion_of(self, fit: JointFit) -> float:
+        """The criterion of another fit to the same frames, at the price of what it has."""
+        return self._trial(fit).criterion
+
     def go_on_from(self, fit: JointFit) -> None:
         """Go on from another fit of the same effects."""
         self._settle(fit)

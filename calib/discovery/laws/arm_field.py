@@ -14,10 +14,11 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from calib.chain.effect import Present
+from calib.chain.empirical import UNNAMED
 from calib.chain.laws.arm_field import FIELD, coordinates, likeness, over, present_field
 from calib.discovery.laws.frames import FrameNormals, frame_normals
 from calib.discovery.locate import Cell
-from calib.discovery.score import Score
+from calib.discovery.score import Score, pose_numbers
 from calib.discovery.search import Search
 from calib.distributions import chi2_tail
 from calib.solver.joint import JointFit
@@ -29,12 +30,17 @@ _SIZES = (0.7, 1.0, 1.5)
 _WORTH = 14.0
 """By which a field must lower -2 log likelihood: 0.001 for three numbers, and their choice."""
 
-_REPEATABLE_M, _REPEATABLE_RAD = 4e-4, 1e-3
+_REPEATABLE_M, _REPEATABLE_RAD = 2e-4, 5e-4
 """No industrial arm scatters so much about a pose it returns to: ISO 9283 figures of arms up to
 2 m reach are 0.01 to 0.1 mm."""
 
 _WORTH_BEYOND = 4.0
 """The same where the arm scatters more than any does: that something is there need not be shown."""
+
+_NUMBERS = 3
+"""Of a field: its size, length scale and share."""
+
+_POSE_LINKS = ("arm", "mount", "board")
 
 _FEWEST_FRAMES, _MOST_FRAMES = 12, 80
 """Of more frames every so many are compared: the field's size and length show in these."""
@@ -193,23 +199,49 @@ def is_arm_field(present: Present) -> bool:
     return present.effect.law is not None and present.effect.law.startswith(FIELD)
 
 
+def _instead_of_laws(search: Search) -> ArmField | None:
+    """The field that explains more than the laws of poses do, which are then taken out."""
+    effects = search.best.fit.model.effects
+    is_law = [p.effect.name == UNNAMED and p.effect.link in _POSE_LINKS for p in effects]
+    if not any(is_law):
+        return None
+    rest = tuple(p for p, law in zip(effects, is_law, strict=True) if not law)
+    bare = search.fitter.with_effects(search.best.fit, rest)
+    found = find_arm_field(bare, search.views)
+    worth = search.criterion_of(bare) - search.best.criterion
+    if found is None or found.gain - _price(search.views) < worth:
+        return None
+    search.go_on_from(bare)
+    return found
+
+
+def _price(views: Views) -> float:
+    """The price of a field's three numbers."""
+    return _NUMBERS * float(np.log(pose_numbers(views)))
+
+
 def with_arm_field(search: Search) -> list[Cell]:
-    """Put a field of the arm into the cell where its errors demand one; its cell."""
+    """Put a field of the arm into the cell where its errors demand one; its cell.
+
+    Laws that only poses show give way to a field that explains more than all of them: errors that
+    are alike in poses near to each other follow, by chance, many a covariate for a while.
+    """
     fit = search.best.fit
     if not search.fitter.has_robot:
         return []
-    found = find_arm_field(fit, search.views)
+    found = _instead_of_laws(search) or find_arm_field(fit, search.views)
     if found is None:
         return []
+    fit = search.best.fit
     search.go_on_from(search.fitter.with_effects(fit, (*fit.model.effects, found.present)))
-    p_value = chi2_tail(found.gain, 3)
+    p_value = chi2_tail(found.gain, _NUMBERS)
     length = found.present.as_mapping()["length_scale"]
     return [
         Cell(
             site="flange_pose",
             link="arm",
             covariate=over(search.views),
-            score=Score(found.gain, 3, p_value, np.zeros(0)),
+            score=Score(found.gain, _NUMBERS, p_value, np.zeros(0)),
             tried=1,
             curve=None,
             where=f"everywhere, alike within about {length:.2g} rad",
