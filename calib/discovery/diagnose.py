@@ -373,7 +373,8 @@ def _excess(fit: JointFit) -> float:
 
 def _scatter(twin: JointFit, has_robot: bool) -> tuple[str, ...]:
     noise = twin.noise
-    if not has_robot or not scatters_too_much(twin):
+    carried = any(is_arm_field(present) for present in twin.model.effects)
+    if not has_robot or carried or not scatters_too_much(twin):
         return ()
     return (
         f"the arm's poses scatter by {1e3 * noise.flange_m:.2f} mm and"
