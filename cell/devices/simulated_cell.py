@@ -84,6 +84,11 @@ def _model(cell: CellFile, truth: Simulation) -> CellModel:
             f"cell {cell.name}: simulation.optics: {', '.join(unknown)} is not known; known are"
             f" {', '.join(OPTICS)}"
         )
+    for name in ("alpha_px", "beta_px"):
+        if name in truth.optics and not truth.optics[name] > 0:
+            raise InputError(
+                f"cell {cell.name}: simulation.optics.{name}: {truth.optics[name]:g} is not above 0"
+            )
     where = f"cell {cell.name}: simulation.effects"
     return CellModel(
         optics=optics_row(**{"height_px": cell.camera.height, **truth.optics}),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 from scipy.spatial.transform import RigidTransform
 
 from calib.chain.effect import Present
@@ -96,7 +97,14 @@ def _record(views: Views, index: int, more: Mapping[str, Any]) -> FrameRecord:
         pose = RigidTransform.from_matrix(views.base_from_flange[index])
         values["base_from_flange"] = PoseRecord.of(pose)
     values |= {name: value for name, value in more.items() if value is not None}
-    return FrameRecord.model_validate(values)
+    try:
+        return FrameRecord.model_validate(values)
+    except ValidationError as wrong:
+        told = "; ".join(f"{fault['loc'][0]}: {fault['msg'].lower()}" for fault in wrong.errors())
+        raise InputError(
+            f"frame {values['frame']} of the simulated cell cannot be logged: {told}. Does the"
+            " board stand before the camera there? See `mount`, `mounted`, `fixed` and the noise"
+        ) from None
 
 
 def _logged(value: np.ndarray[Any, Any] | np.float64) -> Any:

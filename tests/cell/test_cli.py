@@ -255,3 +255,31 @@ def test_an_image_that_is_not_an_image(cell: Cell, recording_folder: Callable[..
 
 def test_the_plan_that_a_dry_run_has_by_itself_names_a_cell_that_is_there() -> None:
     assert read_plan(DRY_RUN_PLAN).cell.robot.model == "irb140"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("alpha_px: 500", "alpha_px: 0", "simulation.optics.alpha_px: 0 is not above 0"),
+        ("beta_px: 500", "beta_px: -500", "simulation.optics.beta_px: -500 is not above 0"),
+    ],
+)
+def test_a_simulated_cell_that_cannot_be_is_refused_and_no_error_of_the_program(
+    cell: Cell, plan: Path, tmp_path: Path, old: str, new: str, words: str
+) -> None:
+    file = tmp_path / "bench.yaml"
+    file.write_text(file.read_text().replace(old, new))
+    said = cell("simulate", plan, "-o", tmp_path / "made")
+    assert words in said.err
+    assert said.status == 2
+
+
+def test_a_board_behind_the_simulated_camera_is_named(cell: Cell, tmp_path: Path) -> None:
+    for file in (ROOT / "configs").glob("irb140-eosens.*.yaml"):
+        (tmp_path / file.name).write_text(file.read_text().replace("eye_in_hand", "eye_to_hand"))
+    name = tmp_path / "irb140-eosens.cell.yaml"
+    if "eye_to_hand" not in name.read_text():
+        name.write_text(name.read_text() + "mount: eye_to_hand\n")
+    said = cell("simulate", tmp_path / "irb140-eosens.plan.yaml", "-o", tmp_path / "made")
+    assert said.status == 2
+    assert "Does the board stand before the camera there?" in said.err
