@@ -165,6 +165,23 @@ def _mute(stand: Stand, _: Launch) -> None:
     stand.arm.faults.mute = True
 
 
+_EMERGENCY_STOP = Fault(
+    "emergency stop",
+    lambda stand, _: stand.arm.emergency_stop(),
+    patterns=("emergency stop", "release the button", RESUMES),
+    halt_s=0.6,
+    restore=_restore_arm,
+)
+_CONTROLLER_DIES = Fault(
+    "controller dies",
+    lambda stand, _: stand.arm.kill(),
+    exits=(_SAFETY,),
+    patterns=_NOBODY_KNOWS,
+    halt_s=0.6,
+    restore=_revive_arm,
+)
+"""Of an arm, whoever made it."""
+
 _UR_CHILD = "ur/child.py"
 _UR = (
     Fault(
@@ -174,13 +191,7 @@ _UR = (
         halt_s=0.6,
         restore=_unlock,
     ),
-    Fault(
-        "emergency stop",
-        lambda stand, _: stand.arm.emergency_stop(),
-        patterns=("emergency stop", "release the button", RESUMES),
-        halt_s=0.6,
-        restore=_restore_arm,
-    ),
+    _EMERGENCY_STOP,
     Fault(
         "program stopped at the pendant",
         lambda stand, _: stand.arm.stop_program("teach pendant"),
@@ -218,14 +229,7 @@ _UR = (
         halt_s=0.6,
         possible=_plays,
     ),
-    Fault(
-        "controller dies",
-        lambda stand, _: stand.arm.kill(),
-        exits=(_SAFETY,),
-        patterns=_NOBODY_KNOWS,
-        halt_s=0.6,
-        restore=_revive_arm,
-    ),
+    _CONTROLLER_DIES,
     Fault(
         "ur-rtde dies",
         _signals_child(_UR_CHILD, signal.SIGKILL),
@@ -325,13 +329,7 @@ _ABB = (
         halt_s=0.6,
         restore=_restore_arm,
     ),
-    Fault(
-        "emergency stop",
-        lambda stand, _: stand.arm.emergency_stop(),
-        patterns=("emergency stop", "release the button", RESUMES),
-        halt_s=0.6,
-        restore=_restore_arm,
-    ),
+    _EMERGENCY_STOP,
     Fault(
         "key turned to manual",
         lambda stand, _: stand.arm.to_manual(),
@@ -347,14 +345,7 @@ _ABB = (
         halt_s=1.5,
         restore=_restore_arm,
     ),
-    Fault(
-        "controller dies",
-        lambda stand, _: stand.arm.kill(),
-        exits=(_SAFETY,),
-        patterns=_NOBODY_KNOWS,
-        halt_s=0.6,
-        restore=_revive_arm,
-    ),
+    _CONTROLLER_DIES,
     Fault("connections dropped", lambda stand, _: stand.arm.drop(), survived=True),
     Fault(
         "Ctrl-C, and the stop is refused",

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, PositiveFloat
 
+from cell.storage.files.camera_numbers import CameraNumbers
 from cell.storage.files.result_part import ResultPart
 
 Vector = tuple[float, float, float]
@@ -134,29 +135,13 @@ class CovariancePart(ResultPart):
     matrix: tuple[tuple[float, ...], ...]
 
 
-class SolutionPart(ResultPart):
+class SolutionPart(ResultPart, CameraNumbers):
     """One camera model."""
 
-    alpha_px: PositiveFloat
-    beta_px: PositiveFloat
-    u0_px: float
-    v0_px: float
+    # in the place that the camera has given them, but never left away
     skew_px: float
     k1: float
     k2: float
-    p1: float = 0.0
-    """Decentering and all that follow: given where the pictures deserve them."""
-    p2: float = 0.0
-    k3: float = 0.0
-    k4: float = 0.0
-    k5: float = 0.0
-    k6: float = 0.0
-    s1: float = 0.0
-    s2: float = 0.0
-    s3: float = 0.0
-    s4: float = 0.0
-    tilt_x_rad: float = 0.0
-    tilt_y_rad: float = 0.0
     at_distance_m: float | None
     """Where alpha and beta move with distance: the distance they are given at."""
     focus: FocusPart | None = None
@@ -338,13 +323,7 @@ class CornersLeftOut(ResultPart):
 class CalibrationFile(ResultPart):
     """The whole of `calibration.json`; metres, radians, pixels."""
 
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        use_attribute_docstrings=True,
-        allow_inf_nan=False,
-        populate_by_name=True,
-    )
+    model_config = ConfigDict(populate_by_name=True)
 
     schema_: Literal["cell.calibration/1"] = Field(alias="schema")
     recording: str

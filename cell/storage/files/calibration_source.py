@@ -19,6 +19,7 @@ from pydantic import (
 from calib.paper.focus_law import LAWS
 from calib.views import FloatArray
 from cell.errors import InputError
+from cell.storage.files.camera_numbers import CameraNumbers
 from cell.storage.files.yaml_model import read_model
 from cell.storage.incoming.text import read_json
 
@@ -79,28 +80,9 @@ class CovarianceSource(_Part):
     matrix: tuple[tuple[float, ...], ...]
 
 
-class SolutionSource(_Part):
+class SolutionSource(CameraNumbers, _Part):
     """One camera model."""
 
-    alpha_px: PositiveFloat
-    beta_px: PositiveFloat
-    u0_px: float
-    v0_px: float
-    skew_px: float = 0.0
-    k1: float = 0.0
-    k2: float = 0.0
-    p1: float = 0.0
-    p2: float = 0.0
-    k3: float = 0.0
-    k4: float = 0.0
-    k5: float = 0.0
-    k6: float = 0.0
-    s1: float = 0.0
-    s2: float = 0.0
-    s3: float = 0.0
-    s4: float = 0.0
-    tilt_x_rad: float = 0.0
-    tilt_y_rad: float = 0.0
     at_distance_m: float | None = None
     focus: LawSource | None = None
     sigma: dict[str, float] = {}

@@ -147,13 +147,7 @@ Verdict = Literal[
 class VerifyFile(ProvenancePart):
     """The whole of `verify.json`; metres, radians, pixels."""
 
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        use_attribute_docstrings=True,
-        allow_inf_nan=False,
-        populate_by_name=True,
-    )
+    model_config = ConfigDict(populate_by_name=True)
 
     schema_: Literal["cell.verify/1"] = Field(alias="schema")
     calibration: str
