@@ -24,22 +24,48 @@ class Board:
     """A planar target; its corners are named (row, col).
 
     For a chessboard `rows` and `cols` count inner corners; for a ChArUco board they are
-    `squares_y - 1` and `squares_x - 1`.
+    `squares_y - 1` and `squares_x - 1`; for an AprilGrid they count the corners of tags, two a tag.
+    With tag 0 at the bottom left, as Kalibr prints it, an AprilGrid's row 0 is the uppermost.
 
     Attributes
     ----------
     kind, rows, cols, square_m:
-        What it is, its inner corners, and the side of a square in metres.
+        What it is, its inner corners, and the side of a square (of a tag) in metres.
     marker_m, dictionary:
-        ChArUco only: marker side in metres, OpenCV dictionary name.
+        ChArUco: marker side in metres, OpenCV dictionary name; AprilGrid: the latter alone.
+    gap_m:
+        AprilGrid only: between two tags.
     """
 
-    kind: Literal["chessboard", "charuco"]
+    kind: Literal["chessboard", "charuco", "aprilgrid"]
     rows: int
     cols: int
     square_m: float
     marker_m: float | None = None
     dictionary: str | None = None
+    gap_m: float | None = None
+
+    @property
+    def identified(self) -> bool:
+        """Whether markers name its corners, so that any part of it will do."""
+        return self.kind != "chessboard"
+
+    @property
+    def places(self) -> tuple[FloatArray, FloatArray]:
+        """(cols,) and (rows,) where the corners stand along the board, in squares."""
+        return self._along(self.cols), self._along(self.rows)
+
+    def _along(self, count: int) -> FloatArray:
+        if self.kind != "aprilgrid":
+            return np.arange(count, dtype=float)
+        tag, corner = np.divmod(np.arange(count), 2)
+        return np.asarray(tag * (1 + float(self.gap_m or 0.0) / self.square_m) + corner)
+
+    @property
+    def extent_m(self) -> tuple[float, float]:
+        """From the first corner to the last, along columns and along rows."""
+        across, down = self.places
+        return float(across[-1] * self.square_m), float(down[-1] * self.square_m)
 
     @property
     def corner_count(self) -> int:
@@ -52,8 +78,8 @@ class Board:
 
         Origin at corner (0, 0), x along columns, y along rows, z away from the viewer.
         """
-        row, col = np.divmod(np.arange(self.corner_count), self.cols)
-        return np.stack([col, row, 0 * row], axis=1) * self.square_m
+        x, y = (part.ravel() for part in np.meshgrid(*self.places))
+        return np.stack([x, y, 0 * x], axis=1) * self.square_m
 
 
 @dataclass(frozen=True)

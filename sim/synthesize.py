@@ -87,6 +87,6 @@ def _visible(state: ChainState, corners_px: FloatArray, log: Views) -> BoolArray
     size = np.array([log.width_px, log.height_px])
     inside = ((corners_px > -0.5) & (corners_px < size - 0.5)).all(axis=2)
     seen = inside & (depth[:, 0] > 0) & facing[:, None]
-    if log.board.kind == "chessboard":
+    if not log.board.identified:
         seen &= seen.all(axis=1, keepdims=True)
     return np.asarray(seen)

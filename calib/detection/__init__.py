@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.detection.aprilgrid import find_aprilgrid
 from calib.detection.charuco import find_charuco
 from calib.detection.finder import find_chessboard
 from calib.detection.first_call import make_ready
@@ -24,6 +25,12 @@ __all__ = [
     "turned_order",
     "turns_to_agree",
 ]
+
+_FINDERS = {
+    "chessboard": find_chessboard,
+    "charuco": find_charuco,
+    "aprilgrid": find_aprilgrid,
+}
 
 
 def detect(image: NDArray[Any], board: Board) -> Detection | Rejected:
@@ -45,8 +52,7 @@ def detect(image: NDArray[Any], board: Board) -> Detection | Rejected:
     if grey.ndim == 3:
         grey = grey.mean(axis=2, dtype=np.float32)
     grey = np.ascontiguousarray(grey, dtype=np.float32)
-    find = find_charuco if board.kind == "charuco" else find_chessboard
-    found = find(grey, board)
+    found = _FINDERS[board.kind](grey, board)
     if isinstance(found, Rejected):
         return found
     limit = np.iinfo(image.dtype).max if np.issubdtype(image.dtype, np.integer) else np.inf

@@ -13,6 +13,7 @@ from calib.detection.markers import Placement, place_by_markers
 from calib.detection.marks import drawn_marks
 from calib.detection.refine import (
     Fitted,
+    Places,
     doubtful,
     edge_angles,
     enlarged,
@@ -102,7 +103,7 @@ def fit_charuco(image: NDArray[np.float32], guess: Guess, board: Board) -> Seen 
     even_dark = float(np.nanmedian(_of_even_corner(start))) > 0
     first = fit_grid(image, start, clear=clear, iterations=6)
     doubt = doubtful(first, expected, even_dark)
-    doubt |= _strays(first.corners_px, doubt)
+    doubt |= strays(first.corners_px, doubt)
     layout = guess.layout
     if layout is None:
         place = _named(image, first.corners_px, doubt, even_dark, board)
@@ -117,9 +118,9 @@ def fit_charuco(image: NDArray[np.float32], guess: Guess, board: Board) -> Seen 
     elif (~doubt).sum() < FEWEST_CORNERS:
         return Rejected(f"only {int((~doubt).sum())} of {doubt.size} corners are seen")
     else:
-        fine = fit_closely(image, _mended(first, doubt, expected), rough=True, clear=clear)
+        fine = fit_closely(image, mended(first, doubt, expected), rough=True, clear=clear)
         doubt |= doubtful(fine, expected, even_dark)
-    doubt |= _strays(fine.corners_px, doubt)
+    doubt |= strays(fine.corners_px, doubt)
     if (~doubt).sum() < FEWEST_CORNERS:
         return Rejected(f"only {int((~doubt).sum())} of {doubt.size} corners are clear")
     place = _named(image, fine.corners_px, doubt, even_dark, board)
@@ -158,7 +159,7 @@ def _marker_share(board: Board) -> float:
     return (board.marker_m or 0.0) / board.square_m
 
 
-def _mended(fitted: Fitted, doubt: NDArray[np.bool_], expected_px: FloatArray) -> FloatArray:
+def mended(fitted: Fitted, doubt: NDArray[np.bool_], expected_px: FloatArray) -> FloatArray:
     """Fit parameters with the unseen corners where expected, and of typical looks."""
     parameters = fitted.parameters.copy()
     parameters[doubt] = np.median(parameters[~doubt], axis=0)
@@ -230,7 +231,7 @@ def _in_line(fitted: Fitted, doubt: NDArray[np.bool_]) -> FloatArray | None:
     line = smoothed(fitted.corners_px, doubt)
     if line is None:
         return None
-    parameters = _mended(fitted, doubt, line)
+    parameters = mended(fitted, doubt, line)
     parameters[..., [X, Y]] = line
     return parameters
 
@@ -244,7 +245,9 @@ def _marks(
     return drawn_marks((image.shape[0], image.shape[1]), around, board, layout, sigma)
 
 
-def smoothed(corners_px: FloatArray, doubt: NDArray[np.bool_]) -> FloatArray | None:
+def smoothed(
+    corners_px: FloatArray, doubt: NDArray[np.bool_], places: Places | None = None
+) -> FloatArray | None:
     """(rows, cols, 2) corners in line: a homography, and how a lens bends it smoothly.
 
     None where too few of the corners are sure.
@@ -252,7 +255,8 @@ def smoothed(corners_px: FloatArray, doubt: NDArray[np.bool_]) -> FloatArray | N
     rows, cols = doubt.shape
     if (~doubt).sum() < FEWEST_CORNERS:
         return None
-    place = np.argwhere(np.ones((rows, cols)))[:, ::-1].astype(float)
+    across = places or (np.arange(cols, dtype=float), np.arange(rows, dtype=float))
+    place = np.stack(np.meshgrid(*across), axis=-1).reshape(-1, 2)
     pixels = corners_px.reshape(-1, 2)
     known = ~doubt.reshape(-1)
     square = float(np.median(shortest_step(lattice_steps(corners_px))[~doubt]))
@@ -266,9 +270,11 @@ def smoothed(corners_px: FloatArray, doubt: NDArray[np.bool_]) -> FloatArray | N
     return np.asarray(straight + np.stack([quadratic(misfit[..., k]) for k in (0, 1)], axis=-1))
 
 
-def _strays(corners_px: FloatArray, doubt: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def strays(
+    corners_px: FloatArray, doubt: NDArray[np.bool_], places: Places | None = None
+) -> NDArray[np.bool_]:
     """(rows, cols) corners that are clearly out of line with the others."""
-    line = smoothed(corners_px, doubt)
+    line = smoothed(corners_px, doubt, places)
     if line is None:
         return np.zeros_like(doubt)
     off = np.linalg.norm(corners_px - line, axis=-1)

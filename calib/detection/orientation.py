@@ -39,7 +39,7 @@ def turned_order(board: Board, quarters: int) -> IntArray:
 
 def possible_turns(board: Board) -> tuple[int, ...]:
     """Quarter turns that the board's colours do not tell apart."""
-    if board.kind == "charuco" or (board.rows + board.cols) % 2:
+    if board.identified or (board.rows + board.cols) % 2:
         return (0,)
     return (0, 1, 2, 3) if board.rows == board.cols and board.rows % 2 == 0 else (0, 2)
 

@@ -66,10 +66,21 @@ class Fitted:
         return np.asarray(np.sqrt(np.maximum(width**2 - PIXEL_VARIANCE, 0)))
 
 
-def lattice_steps(corners_px: FloatArray) -> FloatArray:
+Places = tuple[FloatArray, FloatArray]
+"""(cols,) and (rows,) where the lattice's columns and rows stand, where not one unit apart."""
+
+
+def _gradient(values: FloatArray, axis: int, places: Places | None) -> FloatArray:
+    """By one unit of the lattice along its rows (0) or columns (1)."""
+    if places is None:
+        return np.asarray(np.gradient(values, axis=axis))
+    return np.asarray(np.gradient(values, places[1 - axis], axis=axis))
+
+
+def lattice_steps(corners_px: FloatArray, places: Places | None = None) -> FloatArray:
     """(rows, cols, 4) image step of one column (2) and of one row (2) at each corner."""
-    along_cols = np.gradient(corners_px, axis=1)
-    along_rows = np.gradient(corners_px, axis=0)
+    along_cols = _gradient(corners_px, 1, places)
+    along_rows = _gradient(corners_px, 0, places)
     return np.concatenate([along_cols, along_rows], axis=-1)
 
 
@@ -123,14 +134,16 @@ def enlarged(first: FloatArray, scale: float) -> FloatArray:
     return starts_full
 
 
-def _image_gradient(values: FloatArray, steps: FloatArray, *, vague: bool) -> FloatArray:
+def _image_gradient(
+    values: FloatArray, steps: FloatArray, places: Places | None, *, vague: bool
+) -> FloatArray:
     """(rows, cols, 2) image gradient of a quantity known at the corners.
 
     `vague` values are first smoothed over the whole board.
     """
     values = quadratic(values) if vague else values
-    by_col = np.gradient(values, axis=1)
-    by_row = np.gradient(values, axis=0)
+    by_col = _gradient(values, 1, places)
+    by_row = _gradient(values, 0, places)
     det = steps[..., 0] * steps[..., 3] - steps[..., 1] * steps[..., 2]
     gx = (by_col * steps[..., 3] - by_row * steps[..., 1]) / det
     gy = (by_row * steps[..., 0] - by_col * steps[..., 2]) / det
@@ -147,7 +160,7 @@ def quadratic(values: FloatArray) -> FloatArray:
     return np.asarray((basis @ weights).reshape(values.shape))
 
 
-def _curvature(corners_px: FloatArray, axis: int) -> FloatArray:
+def _curvature(corners_px: FloatArray, axis: int, places: Places | None) -> FloatArray:
     """(rows, cols) bend of the lattice line along `axis`, 1/pixel, positive towards its normal.
 
     A lens bends lines more and more away from its axis: the surface of second order through
@@ -156,8 +169,11 @@ def _curvature(corners_px: FloatArray, axis: int) -> FloatArray:
     line = np.moveaxis(corners_px, axis, 0)
     bend = np.full(line.shape[:2], np.nan)
     if len(line) >= 3:
-        step = 0.5 * (line[2:] - line[:-2])
-        second = line[2:] - 2 * line[1:-1] + line[:-2]
+        at = np.arange(len(line)) if places is None else places[1 - axis]
+        back, ahead = np.diff(at)[:-1, None, None], np.diff(at)[1:, None, None]
+        before, after = (line[1:-1] - line[:-2]) / back, (line[2:] - line[1:-1]) / ahead
+        step = (ahead * before + back * after) / (back + ahead)
+        second = 2 * (after - before) / (back + ahead)
         turning = step[..., 0] * second[..., 1] - step[..., 1] * second[..., 0]
         bend[1:-1] = turning / np.linalg.norm(step, axis=-1) ** 3
     return quadratic(np.moveaxis(bend, 0, axis))
@@ -169,24 +185,29 @@ def _blur_share(parameters: FloatArray) -> float:
     return float(np.nanmedian(parameters[..., WIDTH] / shortest))
 
 
-def _shapes(fitted: FloatArray | None, steps: FloatArray) -> FloatArray:
+def _shapes(fitted: FloatArray | None, steps: FloatArray, places: Places | None) -> FloatArray:
     """(rows, cols, 6) what `saddle.fit_corners` takes as given, from an earlier fit if any."""
     shapes = np.zeros((*steps.shape[:2], 6))
     if fitted is not None:
         # wide blur leaves each corner's own levels too vague for differences between them
         vague = _blur_share(fitted) > _VAGUE_BLUR
         size, sign = np.abs(fitted[..., CONTRAST]), np.sign(fitted[..., CONTRAST])
-        shapes[..., 0:2] = _image_gradient(fitted[..., MEAN], steps, vague=vague)
-        shapes[..., 2:4] = sign[..., None] * _image_gradient(size, steps, vague=vague)
-        shapes[..., 4] = _curvature(fitted[..., [X, Y]], axis=1)
-        shapes[..., 5] = _curvature(fitted[..., [X, Y]], axis=0)
+        shapes[..., 0:2] = _image_gradient(fitted[..., MEAN], steps, places, vague=vague)
+        shapes[..., 2:4] = sign[..., None] * _image_gradient(size, steps, places, vague=vague)
+        shapes[..., 4] = _curvature(fitted[..., [X, Y]], 1, places)
+        shapes[..., 5] = _curvature(fitted[..., [X, Y]], 0, places)
     return shapes
 
 
-def extended(corners_px: FloatArray) -> FloatArray:
-    """One more ring of lattice points around, where a homography through the others has them."""
+def extended(corners_px: FloatArray, places: Places | None = None) -> FloatArray:
+    """One more ring of lattice points around, where a homography through the others has them.
+
+    Where the lattice is not even, the ring is as far away as the second next lines are apart.
+    """
     rows, cols = corners_px.shape[:2]
-    place = np.argwhere(np.ones((rows + 2, cols + 2)))[:, ::-1].reshape(rows + 2, cols + 2, 2) - 1.0
+    across, down = places or (np.arange(cols, dtype=float), np.arange(rows, dtype=float))
+    x, y = (_one_more(at) for at in (across, down))
+    place = np.stack(np.meshgrid(x, y), axis=-1)
     inner = place[1:-1, 1:-1].reshape(-1, 2)
     H, _ = cv2.findHomography(inner, corners_px.reshape(-1, 2))
     expected = cv2.perspectiveTransform(place.reshape(1, -1, 2), H).reshape(place.shape)
@@ -194,10 +215,16 @@ def extended(corners_px: FloatArray) -> FloatArray:
     return np.asarray(expected + np.pad(misfit, ((1, 1), (1, 1), (0, 0)), mode="edge"))
 
 
-def _neighbour_lines(corners_px: FloatArray) -> FloatArray:
+def _one_more(at: FloatArray) -> FloatArray:
+    """Places with one more before and after: an even lattice goes on, of two steps both recur."""
+    first, last = (at[2] - at[1], at[-2] - at[-3]) if len(at) > 2 else (at[1] - at[0],) * 2
+    return np.concatenate([[at[0] - first], at, [at[-1] + last]])
+
+
+def _neighbour_lines(corners_px: FloatArray, places: Places | None) -> FloatArray:
     """(rows, cols, 4, 4) the `lines` of `saddle.fit_corners`."""
     rows, cols = corners_px.shape[:2]
-    around = extended(corners_px)
+    around = extended(corners_px, places)
     steps = lattice_steps(around)
     lines = np.ones((rows, cols, 4, 4))
     # edge 1 has its normal down the rows, edge 2 against the columns
@@ -220,6 +247,8 @@ def fit_grid(
     clear: float = 1.0,
     iterations: int = 12,
     marks: NDArray[np.float32] = NO_MARKS,
+    places: Places | None = None,
+    reach: float = 0.4,
 ) -> Fitted:
     """Fit all corners of a grid from (rows, cols, 7) starts.
 
@@ -227,14 +256,15 @@ def fit_grid(
     board and the bend of its lines in the image, which the fit then takes as given.
     """
     rows, cols = first.shape[:2]
-    steps = lattice_steps(first[..., [X, Y]])
-    shapes = _shapes(first if bent else None, steps)
+    steps = lattice_steps(first[..., [X, Y]], places)
+    shapes = _shapes(first if bent else None, steps, places)
     parameters, covariance, residual = fit_corners(
         image,
         first.reshape(-1, PARAMETERS),
         steps.reshape(-1, 4),
         shapes.reshape(-1, 6),
-        _neighbour_lines(first[..., [X, Y]]).reshape(-1, 4, 4),
+        _neighbour_lines(first[..., [X, Y]], places).reshape(-1, 4, 4),
+        reach=reach,
         clear=clear,
         iterations=iterations,
         marks=marks,

@@ -41,6 +41,6 @@ def as_detection(
         sigma_px=np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2),
         blur_px=of_seen(fitted.blur_px),
         contrast=of_seen(2 * np.abs(fitted.parameters[..., CONTRAST])),
-        upside_down_known=board.kind == "charuco" or (board.rows + board.cols) % 2 == 1,
+        upside_down_known=board.identified or (board.rows + board.cols) % 2 == 1,
         saturated=saturated,
     )

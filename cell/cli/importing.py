@@ -26,7 +26,8 @@ def import_(
         str | None,
         typer.Option(
             help="ROWSxCOLSxSQUARE_M of a chessboard in inner corners (6x9x0.025), or"
-            " charuco:SQUARES_XxSQUARES_YxSQUARE_MxMARKER_M:DICTIONARY."
+            " charuco:SQUARES_XxSQUARES_YxSQUARE_MxMARKER_M:DICTIONARY, or"
+            " aprilgrid:TAGS_XxTAGS_YxTAG_MxGAP_M, or Kalibr's target file (.yaml)."
         ),
     ] = None,
     poses: Annotated[

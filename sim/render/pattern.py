@@ -9,6 +9,10 @@ alternate from there. On a board with an even number of columns and an odd numbe
 corner squares of row 0 are dark and both of the last row are light; with odd columns and even
 rows the same holds for column 0. A ChArUco board follows OpenCV's layout: its corner square
 (0, 0) is dark too, markers sit in the light squares, row by row.
+
+An AprilGrid is counted in tags: s and t in sides of a tag, (0, 0) at the top left tag's corner. A
+small dark square of the gap's width fills every crossing of gaps, at the rim too; tags are numbered
+from the bottom left, row by row upwards.
 """
 
 from __future__ import annotations
@@ -26,6 +30,9 @@ WHITE, BLACK, BACKGROUND = 0.85, 0.04, 0.25
 
 _QUIET_ZONE_SQUARES = 1.0
 _FAR = 1e9
+_OUTSIDE, _MARGIN = -2, -1
+TAG_BORDER = 2
+"""Modules of a tag's black border on Kalibr's boards."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +42,7 @@ class Pattern:
     Attributes
     ----------
     rows, cols:
-        Inner corners.
+        Inner corners; of an AprilGrid, tags.
     quiet_zone:
         White margin around the printed squares, in squares.
     marker_side:
@@ -43,7 +50,10 @@ class Pattern:
     bits:
         (markers, cells, cells) reflectance of each marker's cells, its border included.
     marker_of_square:
-        (rows + 1, cols + 1) index of the marker in each square, -1 for none.
+        (rows + 1, cols + 1) index of the marker in each square, -1 for none; of an AprilGrid
+        (rows, cols) the number of each tag.
+    gap:
+        Between the tags of an AprilGrid, in squares; 0 for other boards.
     """
 
     rows: int
@@ -52,11 +62,13 @@ class Pattern:
     marker_side: float
     bits: FloatArray
     marker_of_square: FloatArray
+    gap: float = 0.0
 
     @property
     def shape(self) -> FloatArray:
-        """(4,) rows, cols, quiet zone, marker side, as the compiled loops take them."""
-        return np.array([self.rows, self.cols, self.quiet_zone, self.marker_side], float)
+        """(5,) rows, cols, quiet zone, marker side, gap, as the compiled loops take them."""
+        sides = [self.rows, self.cols, self.quiet_zone, self.marker_side, self.gap]
+        return np.array(sides, float)
 
 
 def pattern_of(board: Board) -> Pattern:
@@ -64,6 +76,8 @@ def pattern_of(board: Board) -> Pattern:
     none = np.full((board.rows + 1, board.cols + 1), -1.0)
     if board.kind == "chessboard":
         return Pattern(board.rows, board.cols, _QUIET_ZONE_SQUARES, 0.0, np.zeros((0, 1, 1)), none)
+    if board.kind == "aprilgrid":
+        return _tag_grid(board)
     if board.marker_m is None or board.dictionary is None:
         raise ValueError("a charuco board needs marker_m and dictionary")
     light = np.add.outer(np.arange(board.rows + 1), np.arange(board.cols + 1)) % 2 == 1
@@ -78,13 +92,30 @@ def pattern_of(board: Board) -> Pattern:
     )
 
 
-def _marker_cells(dictionary: str, count: int) -> FloatArray:
+def _tag_grid(board: Board) -> Pattern:
+    rows, cols = board.rows // 2, board.cols // 2
+    return Pattern(
+        rows=rows,
+        cols=cols,
+        quiet_zone=_QUIET_ZONE_SQUARES,
+        marker_side=1.0,
+        bits=_marker_cells(str(board.dictionary), rows * cols, TAG_BORDER),
+        marker_of_square=np.arange(rows * cols, dtype=float).reshape(rows, cols)[::-1].copy(),
+        gap=float(board.gap_m or 0.0) / board.square_m,
+    )
+
+
+def _marker_cells(dictionary: str, count: int, border: int = 1) -> FloatArray:
     number = getattr(cv2.aruco, dictionary, None)
     if number is None:
         raise ValueError(f"unknown marker dictionary {dictionary!r}: use an OpenCV name")
     markers = cv2.aruco.getPredefinedDictionary(number)
-    cells = markers.markerSize + 2
-    drawn = [cv2.aruco.generateImageMarker(markers, i, cells) for i in range(count)]
+    cells = markers.markerSize + 2 * border
+    if count > len(markers.bytesList):
+        raise ValueError(f"{count} markers are more than {dictionary} has")
+    drawn = [
+        cv2.aruco.generateImageMarker(markers, i, cells, borderBits=border) for i in range(count)
+    ]
     return np.where(np.array(drawn) > 127, WHITE, BLACK).astype(float)
 
 
@@ -94,7 +125,9 @@ def leaf(s, t, shape, bits, marker_of_square, out):  # type: ignore[no-untyped-d
 
     `out` becomes (s_low, s_high, t_low, t_high).
     """
-    rows, cols, quiet, side = shape
+    rows, cols, quiet, side, gap = shape
+    if gap > 0.0:
+        return _tags(s, t, rows, cols, quiet, gap, bits, marker_of_square, out)
     if s < -1.0 or s >= cols or t < -1.0 or t >= rows:
         return _around(s, t, rows, cols, quiet, out)
     column, row = np.floor(s), np.floor(t)
@@ -106,6 +139,46 @@ def leaf(s, t, shape, bits, marker_of_square, out):  # type: ignore[no-untyped-d
     if marker < 0:
         return WHITE
     return _marker(s - column, t - row, column, row, side, bits[marker], out)
+
+
+@njit(cache=True)
+def _tags(s, t, rows, cols, quiet, gap, bits, tag_at, out):  # type: ignore[no-untyped-def]
+    """An AprilGrid: tags, small squares where gaps cross, white between."""
+    column, x = _gap_or_tag(s, cols, gap, quiet, out, 0)
+    row, y = _gap_or_tag(t, rows, gap, quiet, out, 2)
+    if column == _OUTSIDE or row == _OUTSIDE:
+        return BACKGROUND
+    if column == _MARGIN or row == _MARGIN or (x < 0.0) != (y < 0.0):
+        return WHITE
+    if x < 0.0:
+        return BLACK
+    cells = bits[int(tag_at[row, column])]
+    n = cells.shape[0]
+    k, m = min(int(x * n), n - 1), min(int(y * n), n - 1)
+    left, top = column * (1.0 + gap), row * (1.0 + gap)
+    out[0], out[1] = left + k / n, left + (k + 1) / n
+    out[2], out[3] = top + m / n, top + (m + 1) / n
+    return cells[m, k]
+
+
+@njit(cache=True)
+def _gap_or_tag(x, count, gap, quiet, out, k):  # type: ignore[no-untyped-def]
+    """Which tag's stripe x lies in and where, negative for the gap before it; its bounds."""
+    end = count * (1.0 + gap)
+    if x < -gap - quiet or x >= end + quiet:
+        out[k], out[k + 1] = (-_FAR, -gap - quiet) if x < 0.0 else (end + quiet, _FAR)
+        return _OUTSIDE, 0.0
+    if x < -gap or x >= end:
+        out[k], out[k + 1] = (-gap - quiet, -gap) if x < 0.0 else (end, end + quiet)
+        return _MARGIN, 0.0
+    tag = int(np.floor((x + gap) / (1.0 + gap)))
+    inside = x - tag * (1.0 + gap)
+    low = tag * (1.0 + gap)
+    if inside < 0.0:
+        out[k], out[k + 1] = low - gap, low
+        return tag, inside
+    out[k], out[k + 1] = low, low + 1.0
+    return tag, inside
 
 
 @njit(cache=True)

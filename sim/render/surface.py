@@ -58,14 +58,20 @@ class Surface:
         """Splines through what the corners depart from their grid, for the axes that depart."""
         board = self.board
         offsets = (self.points_m - board.corners_m).reshape(board.rows, board.cols, 3)
-        t = np.arange(-_PAD_SQUARES, board.rows + _PAD_SQUARES, dtype=float)
-        s = np.arange(-_PAD_SQUARES, board.cols + _PAD_SQUARES, dtype=float)
+        s, t = (_beyond(places) for places in board.places)
         degree = min(3, board.rows - 1, board.cols - 1)
         return [
             (axis, RectBivariateSpline(t, s, _continued(offsets[:, :, axis]), kx=degree, ky=degree))
             for axis in range(3)
             if np.abs(offsets[:, :, axis]).max() > 0
         ]
+
+
+def _beyond(places: FloatArray) -> FloatArray:
+    """The corners' places along the board, and as many more beyond as `_continued` goes on."""
+    step = (places[-1] - places[0]) / (len(places) - 1)
+    more = step * np.arange(1, _PAD_SQUARES + 1)
+    return np.concatenate([places[0] - more[::-1], places, places[-1] + more])
 
 
 def _continued(grid: FloatArray) -> FloatArray:

@@ -9,8 +9,9 @@ from calib.views import FloatArray
 
 def _act(values: FloatArray, state: ChainState) -> None:
     board = state.views.board
-    x = state.points_m[:, 0] / ((board.cols - 1) * board.square_m) * 2.0 - 1.0
-    y = state.points_m[:, 1] / ((board.rows - 1) * board.square_m) * 2.0 - 1.0
+    right, bottom = board.extent_m
+    x = state.points_m[:, 0] / right * 2.0 - 1.0
+    y = state.points_m[:, 1] / bottom * 2.0 - 1.0
     height = values[0] * (x * x - 1.0) + values[1] * (y * y - 1.0) + values[2] * x * y
     state.points_m[:, 2] += height
 

@@ -15,8 +15,8 @@ _WAVES = tuple((i, j) for i in range(_ORDER) for j in range(_ORDER) if i + j > 1
 
 def _act(values: FloatArray, state: ChainState) -> None:
     board = state.views.board
-    x = state.points_m[:, 0] / ((board.cols - 1) * board.square_m)
-    y = state.points_m[:, 1] / ((board.rows - 1) * board.square_m)
+    right, bottom = board.extent_m
+    x, y = state.points_m[:, 0] / right, state.points_m[:, 1] / bottom
     along_x = np.cos(np.pi * np.arange(_ORDER)[:, None] * x)
     along_y = np.cos(np.pi * np.arange(_ORDER)[:, None] * y)
     for amount, (i, j) in zip(values, _WAVES, strict=True):

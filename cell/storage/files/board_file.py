@@ -69,11 +69,55 @@ class Charuco(_Part):
         )
 
 
-BoardFile = Annotated[Chessboard | Charuco, Field(discriminator="type")]
+_FAMILIES = {"tag36h11": "DICT_APRILTAG_36h11"}
+"""OpenCV's names of tag families."""
 
 
-def board_file(board: Board) -> Chessboard | Charuco:
+class AprilGrid(_Part):
+    """Kalibr's board of AprilTags, counted in tags; tag 0 is at the bottom left."""
+
+    type: Literal["aprilgrid"]
+    tags_x: int = Field(ge=1, le=BOARD_SIDE)
+    tags_y: int = Field(ge=1, le=BOARD_SIDE)
+    tag_m: Length
+    """Side of a tag, its black border included."""
+    gap_m: Length
+    """White between two tags: Kalibr's `tagSpacing` times `tagSize`."""
+    family: Literal["tag36h11"] = "tag36h11"
+
+    @model_validator(mode="after")
+    def _countable(self) -> Self:
+        if self.tags_x * self.tags_y < 2:
+            raise ValueError("has one tag; two and more tell where its corners are")
+        if self.gap_m > self.tag_m:
+            raise ValueError("gap_m is wider than a tag")
+        return _checked(self, 4 * self.tags_x * self.tags_y)
+
+    def board(self) -> Board:
+        """The board as the calibration knows it: the corners of its tags."""
+        return Board(
+            "aprilgrid",
+            2 * self.tags_y,
+            2 * self.tags_x,
+            self.tag_m,
+            dictionary=_FAMILIES[self.family],
+            gap_m=self.gap_m,
+        )
+
+
+BoardFile = Annotated[Chessboard | Charuco | AprilGrid, Field(discriminator="type")]
+
+
+def board_file(board: Board) -> Chessboard | Charuco | AprilGrid:
     """A board in the words of the files."""
+    if board.kind == "aprilgrid":
+        return AprilGrid(
+            type="aprilgrid",
+            tags_x=board.cols // 2,
+            tags_y=board.rows // 2,
+            tag_m=board.square_m,
+            gap_m=board.gap_m or 0.0,
+        )
     if board.kind == "chessboard":
         return Chessboard(
             type="chessboard", rows=board.rows, cols=board.cols, square_m=board.square_m

@@ -21,7 +21,7 @@ from pydantic import (
 
 from calib.views import FloatArray, Mount
 from cell.storage.files.arm_description import adopt_description
-from cell.storage.files.board_file import Charuco, Chessboard
+from cell.storage.files.board_file import AprilGrid, Charuco, Chessboard
 from cell.storage.files.camera_file import CameraFile
 from cell.storage.files.parts import Box, Distance, Duration, Finite, Joints, Part, Pose, Positive
 from cell.storage.files.yaml_model import read_model
@@ -41,7 +41,13 @@ class CellCharuco(Charuco):
     model_config = ConfigDict(extra="forbid")
 
 
-BoardFile = Annotated[CellChessboard | CellCharuco, Field(discriminator="type")]
+class CellAprilGrid(AprilGrid):
+    """An AprilGrid; a key it does not know is an error."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+BoardFile = Annotated[CellChessboard | CellCharuco | CellAprilGrid, Field(discriminator="type")]
 
 
 class SimulatedRobot(Part):

@@ -48,12 +48,24 @@ def draw_board(board: Board, path: Path, paper: str | None = None) -> tuple[floa
         It does not fit the paper, is no such file, or cannot be written.
     """
     suffix = path.suffix.lower()
+    if board.kind == "aprilgrid":
+        raise InputError(f"-o {path}: an AprilGrid is drawn by Kalibr: {kalibr_command(board)}")
     if suffix not in SUFFIXES:
         raise InputError(f"-o {path}: must end with {' or '.join(SUFFIXES)}")
     page = sheet(board, paper)
     with atomic_file(path) as file:
         file.write(page.pdf() if suffix == ".pdf" else page.svg())
     return page.width_mm, page.height_mm
+
+
+def kalibr_command(board: Board) -> str:
+    """What draws an AprilGrid."""
+    spacing = float(board.gap_m or 0.0) / board.square_m
+    return (
+        "kalibr_create_target_pdf --type apriltag"
+        f" --nx {board.cols // 2} --ny {board.rows // 2} --tsize {board.square_m:g}"
+        f" --tspace {spacing:g}"
+    )
 
 
 def sheet(board: Board, paper: str | None = None) -> VectorPage:

@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.chain.kinematics import MODELS, UnknownArm, arm
+from calib.views import Board
 from cell.errors import InputError
+from cell.storage.files.board_file import BoardFile
 from cell.storage.files.cell_file import SCHEMA, CellFile
 from cell.storage.files.parts import Pose
 from cell.storage.files.writing import yaml_text
@@ -182,13 +184,8 @@ def _distances(answers: Answers) -> tuple[float, float]:
 
 
 def _longer_side_m(answers: Answers) -> float:
-    board = answers.board
-    squares = (
-        max(board["rows"], board["cols"]) + 1
-        if board["type"] == "chessboard"
-        else max(board["squares_x"], board["squares_y"])
-    )
-    return float(squares * board["square_m"])
+    board = _board(answers)
+    return max(board.extent_m) + 2 * board.square_m
 
 
 def _transform(numbers: tuple[float, ...]) -> RigidTransform:
@@ -205,9 +202,7 @@ def _pose(numbers: tuple[float, ...]) -> dict[str, Any]:
 def _seen_from_home(answers: Answers, home: tuple[float, ...], distance_m: float) -> dict[str, Any]:
     """base_from_fixed with the board's middle straight before the camera at home, square to it."""
     flange = _flange(answers.model, home)
-    rows, cols = _corners(answers)
-    square = answers.board["square_m"]
-    middle = np.array([(cols - 1) * square / 2, (rows - 1) * square / 2, 0.0])
+    middle = _board(answers).corners_m.mean(axis=0)
     camera_from_board = RigidTransform.from_translation(np.array([0.0, 0.0, distance_m]) - middle)
     mounted = flange * _transform(answers.camera_at)
     hand = answers.mount == "eye_in_hand"
@@ -215,8 +210,6 @@ def _seen_from_home(answers: Answers, home: tuple[float, ...], distance_m: float
     return Pose.of(fixed).model_dump(mode="json", exclude_none=True)
 
 
-def _corners(answers: Answers) -> tuple[int, int]:
-    board = answers.board
-    if board["type"] == "chessboard":
-        return board["rows"], board["cols"]
-    return board["squares_y"] - 1, board["squares_x"] - 1
+def _board(answers: Answers) -> Board:
+    described: BoardFile = TypeAdapter(BoardFile).validate_python(answers.board)
+    return described.board()

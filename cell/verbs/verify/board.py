@@ -96,7 +96,7 @@ def board_before(old: OldCell) -> FloatArray:
 def _turn(old: OldCell, views: Views, place: FloatArray) -> int:
     """Half a turn where the board's names allow it and bring it nearer to its old place."""
     board = views.board
-    if board.kind == "charuco" or (board.rows + board.cols) % 2:
+    if board.identified or (board.rows + board.cols) % 2:
         return 0
     half = np.diag([-1.0, -1.0, 1.0, 1.0])
     half[:2, 3] = board.corners_m[-1, :2]
