@@ -47,7 +47,7 @@ def board(
 
 def _write_target(described: AprilGrid, output: Path, *, as_json: bool) -> None:
     from cell.storage.files.kalibr_target import kalibr_target
-    from cell.storage.whole import write_whole
+    from  import write_whole
 
     write_whole(output, kalibr_target(described))
     result = {"file": str(output), "board": described.model_dump()}
