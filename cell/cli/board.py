@@ -46,9 +46,9 @@ def board(
 
 
 def _write_target(described: AprilGrid, output: Path, *, as_json: bool) -> None:
+    from cell.storage.atomic import write_atomically
     from cell.storage.files.kalibr_target import kalibr_target
-    from  import write_whole
 
-    write_whole(output, kalibr_target(described))
+    write_atomically(output, kalibr_target(described))
     result = {"file": str(output), "board": described.model_dump()}
     show(f"{output}: Kalibr's target file of this board", result, as_json=as_json)
