@@ -40,7 +40,7 @@ class KinematicsInfo:
     calibration_status:
         ``linearised`` where a factory calibration is in force.
     joint_limits_rad:
-        Six ranges of the safety settings, or None where they are not told.
+        Six ranges of the safety settings, or None where they are not there or are no ranges.
     """
 
     theta_rad: tuple[float, ...]
@@ -95,8 +95,7 @@ def _package(link: socket.socket, deadline: float) -> tuple[int, bytes]:
 
 def _checked(host: str, found: KinematicsInfo) -> KinematicsInfo:
     tables = (found.theta_rad, found.a_m, found.d_m, found.alpha_rad)
-    limits = found.joint_limits_rad or ()
-    if not (np.isfinite(tables).all() and np.isfinite(limits).all()):
+    if not np.isfinite(tables).all():
         raise DeviceError(
             f"UR controller {host}: the kinematics on port {PRIMARY_PORT} are not finite. Restart "
             "the controller; if it goes on, its calibration file is damaged"
@@ -112,11 +111,17 @@ def _find(package: tuple[int, bytes]) -> KinematicsInfo | None:
     values = _BODY.unpack_from(parts[_KINEMATICS])
     theta, a, d, alpha = (values[i : i + 6] for i in range(6, 30, 6))
     status = _STATUS.get(values[30], f"status {values[30]}")
-    limits = None
-    if _CONFIGURATION in parts:
-        flat = _LIMITS.unpack_from(parts[_CONFIGURATION])
-        limits = tuple(zip(flat[::2], flat[1::2], strict=True))
+    limits = _limits(parts.get(_CONFIGURATION, b""))
     return KinematicsInfo(theta, a, d, alpha, values[:6], status, limits)
+
+
+def _limits(configuration: bytes) -> tuple[tuple[float, float], ...] | None:
+    """Each joint's range; unbounded where it turns without end (wrist 3 of a UR3)."""
+    if len(configuration) < _LIMITS.size:
+        return None
+    flat = _LIMITS.unpack_from(configuration)
+    limits = tuple(zip(flat[::2], flat[1::2], strict=True))
+    return limits if all(low < high for low, high in limits) else None
 
 
 def _parts(body: bytes) -> dict[int, bytes]:

@@ -173,6 +173,18 @@ def kinematics(*values):
     return package(16, package(5, struct.pack(">6I24dI", *range(6), *values, 2)))
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "known"),
+    [(-6.3, 6.3, True), (-math.inf, math.inf, True), (math.nan, 6.3, False), (6.3, -6.3, False)],
+)
+def test_joint_limits_are_ranges_bounded_or_not_and_cost_no_kinematics(low, high, known):
+    shown = package(5, struct.pack(">6I24dI", *range(6), *[0.1] * 24, 2))
+    limits = package(6, struct.pack(">12d", *[-6.3, 6.3] * 5, low, high))
+    with answering(PRIMARY_PORT, again_and_again(package(16, shown + limits))) as address:
+        found = read_kinematics(address)
+    assert found.joint_limits_rad == (((-6.3, 6.3),) * 5 + ((low, high),) if known else None)
+
+
 def test_kinematics_that_are_not_finite_are_refused_by_name():
     data = kinematics(*[0.1] * 23, math.nan)
     with answering(PRIMARY_PORT, again_and_again(data)) as address:
