@@ -167,7 +167,7 @@ def _offset(
             f" {late} against the joints'"
         )
     if stated is not None:
-        return stated, f"{words}; {1e3 * stated:.1f} ms are added as said (--clock-offset)"
+        return stated, f"{words}; {1e3 * stated:.1f} ms are added as stated (--clock-offset)"
     if found is None or not found.sure:
         return 0.0, f"{words}; nothing is added"
     return found.offset_s, f"{words}; made good (--clock-offset 0 leaves it)"
