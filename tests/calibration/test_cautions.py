@@ -138,7 +138,7 @@ def test_poses_that_froze_midway_are_named_by_the_calibration() -> None:
     poses[6:] = poses[6]
     views = with_poses(poses)
     words = mixups_said(views, calibrate(views))
-    assert "stands still from frame 6 to 11 while the pictures go on" in words
+    assert "stands still from frame 7 to 11 while the pictures go on" in words
 
 
 def test_identical_frames_count_once() -> None:
