@@ -34,11 +34,11 @@ def check_as_configured(robot: RobotFile, arm: ArmKinematics, raw: Mapping[str, 
 
 def tcp_differs(robot: RobotFile, raw: Mapping[str, Any]) -> list[str]:
     """The tool centre point: a millimetre or half a degree is another one."""
-    told = raw.get("tcp_offset")
-    if robot.tcp is None or told is None:
+    reported = raw.get("tcp_offset")
+    if robot.tcp is None or reported is None:
         return []
     named = robot.tcp.transform()
-    offset = RigidTransform.from_components(told[:3], Rotation.from_rotvec(told[3:]))
+    offset = RigidTransform.from_components(reported[:3], Rotation.from_rotvec(reported[3:]))
     off = named.inv() * offset
     if float(np.linalg.norm(off.translation)) <= _TCP_M and off.rotation.magnitude() <= _TCP_RAD:
         return []
@@ -50,23 +50,23 @@ def tcp_differs(robot: RobotFile, raw: Mapping[str, Any]) -> list[str]:
 
 def payload_differs(robot: RobotFile, raw: Mapping[str, Any]) -> list[str]:
     """The payload, where the file gives one."""
-    told, named = raw.get("payload"), robot.payload_kg
-    if named == 0.0 or told is None:
+    reported, named = raw.get("payload"), robot.payload_kg
+    if named == 0.0 or reported is None:
         return []
-    if abs(told - named) <= _PAYLOAD_KG + _PAYLOAD_SHARE * named:
+    if abs(reported - named) <= _PAYLOAD_KG + _PAYLOAD_SHARE * named:
         return []
     return [
-        f"robot.payload_kg is {named:g} kg, the controller's payload {told:g} kg: an arm that does"
-        " not know its load sags and trips; set it at the pendant, or correct the file"
+        f"robot.payload_kg is {named:g} kg, the controller's payload {reported:g} kg: an arm that"
+        " does not know its load sags and trips; set it at the pendant, or correct the file"
     ]
 
 
 def limits_differ(arm: ArmKinematics, raw: Mapping[str, Any]) -> list[str]:
     """Joint limits of the controller's safety settings that are narrower than the cell's."""
-    told = (raw.get("kinematics") or {}).get("joint_limits_rad")
-    if told is None or np.shape(told) != arm.limits_rad.shape:
+    reported = (raw.get("kinematics") or {}).get("joint_limits_rad")
+    if reported is None or np.shape(reported) != arm.limits_rad.shape:
         return []
-    cells, theirs = np.degrees(arm.limits_rad), np.degrees(told)
+    cells, theirs = np.degrees(arm.limits_rad), np.degrees(reported)
     slack = np.degrees(_LIMIT_RAD)
     narrower = (theirs[:, 0] > cells[:, 0] + slack) | (theirs[:, 1] < cells[:, 1] - slack)
     return [

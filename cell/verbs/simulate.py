@@ -100,9 +100,11 @@ def _record(views: Views, index: int, more: Mapping[str, Any]) -> FrameRecord:
     try:
         return FrameRecord.model_validate(values)
     except ValidationError as wrong:
-        told = "; ".join(f"{fault['loc'][0]}: {fault['msg'].lower()}" for fault in wrong.errors())
+        reported = "; ".join(
+            f"{fault['loc'][0]}: {fault['msg'].lower()}" for fault in wrong.errors()
+        )
         raise InputError(
-            f"frame {values['frame']} of the simulated cell cannot be logged: {told}. Does the"
+            f"frame {values['frame']} of the simulated cell cannot be logged: {reported}. Does the"
             " board stand before the camera there? See `mount`, `mounted`, `fixed` and the noise"
         ) from None
 

@@ -33,19 +33,19 @@ class SetArm(FakeArm):
         return replace(super().state(), raw=self.raw)
 
 
-def bench_of(folder: Path, cell: str = SET, **told: Any) -> Bench:
+def bench_of(folder: Path, cell: str = SET, **reported: Any) -> Bench:
     bench = Bench(folder, PLAN + NO_BOARD, cell=cell)
     bench.arm = SetArm(bench.clock.now)
     bench.arm.raw = {
-        "tcp_offset": told.get("tcp", TCP),
-        "payload": told.get("payload", 1.2),
-        "kinematics": {"joint_limits_rad": told.get("limits", WIDE)},
+        "tcp_offset": reported.get("tcp", TCP),
+        "payload": reported.get("payload", 1.2),
+        "kinematics": {"joint_limits_rad": reported.get("limits", WIDE)},
     }
     return bench
 
 
 @pytest.mark.parametrize(
-    ("told", "words"),
+    ("reported", "words"),
     [
         ({"tcp": (0, 0, 0.152, 0, 0, np.pi / 2)}, ["0.0 0.0 150.0 mm", "0.0 0.0 152.0 mm"]),
         ({"tcp": (0, 0, 0.15, 0, 0, np.pi / 2 + 0.02)}, ["90.0°", "91.1°"]),
@@ -56,9 +56,9 @@ def bench_of(folder: Path, cell: str = SET, **told: Any) -> Bench:
     ],
 )
 def test_a_difference_ends_the_run_before_the_first_move_with_both_values(
-    tmp_path: Path, told: dict[str, Any], words: list[str]
+    tmp_path: Path, reported: dict[str, Any], words: list[str]
 ) -> None:
-    bench = bench_of(tmp_path, **told)
+    bench = bench_of(tmp_path, **reported)
     result = bench.run()
     assert result.finish is Finish.SAFETY
     assert result.finish.exit_status == EXIT_SAFETY
@@ -68,7 +68,7 @@ def test_a_difference_ends_the_run_before_the_first_move_with_both_values(
 
 
 @pytest.mark.parametrize(
-    ("cell", "told"),
+    ("cell", "reported"),
     [
         (SET, {}),
         (SET, {"payload": 1.25, "tcp": (0, 0, 0.1505, 0, 0, np.pi / 2)}),
@@ -78,7 +78,7 @@ def test_a_difference_ends_the_run_before_the_first_move_with_both_values(
     ids=["the same", "nearly", "not told", "not said"],
 )
 def test_what_agrees_or_is_not_known_is_no_obstacle(
-    tmp_path: Path, cell: str, told: dict[str, Any]
+    tmp_path: Path, cell: str, reported: dict[str, Any]
 ) -> None:
-    result = bench_of(tmp_path, cell, **told).run()
+    result = bench_of(tmp_path, cell, **reported).run()
     assert (result.finish, result.frames) == (Finish.COMPLETED, 4), result.reason

@@ -53,11 +53,11 @@ def missed(model: CellModel, true: FloatArray) -> float:
 def test_a_field_is_carried_and_predicts_frames_that_were_not_fitted(spoilt, site):
     fitter = Fitter(spoilt(FITTED, True))
     search = Search(fitter.fit(plain_cell(), NOISE), fitter)
-    told = demanded_field(search)
-    assert told is not None
-    assert told[1].site == site
+    reported = demanded_field(search)
+    assert reported is not None
+    assert reported[1].site == site
     before = search.best.fit
-    put_in(search, told[0])
+    put_in(search, reported[0])
     after = search.best.fit
     true, plain = spoilt(AHEAD, False).corners_px, predict(plain_cell(), AHEAD)
     sound = Fitter(record(plain_cell(), FITTED, 31)).fit(plain_cell(), NOISE)

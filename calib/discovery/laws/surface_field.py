@@ -357,24 +357,24 @@ def demanded_field(search: Search) -> tuple[SurfaceField, Cell] | None:
     """The field that the best cell so far demands, with its cell; none that it has already."""
     fit, views = search.best.fit, search.views
     known = [surface_of(p) for p in fit.model.effects]
-    told = []
+    reported = []
     for tested in field_scores(fit, views):
         surface = next(s for s in SURFACES if s.site == tested.site)
         if surface in known or tested.score.p_value > _ALARM:
             continue
         found = find_surface_field(fit, views, surface)
         if found is not None:
-            told.append((found, found.cell(tested)))
-    return max(told, key=lambda one: one[0].gain, default=None)
+            reported.append((found, found.cell(tested)))
+    return max(reported, key=lambda one: one[0].gain, default=None)
 
 
 def field_leads(search: Search) -> Cell | None:
     """Put in a field that explains more of the cell as it is than any name does; its cell."""
-    told = demanded_field(search)
-    if told is None or told[0].gain < search.promised(search.best.fit):
+    reported = demanded_field(search)
+    if reported is None or reported[0].gain < search.promised(search.best.fit):
         return None
-    put_in(search, told[0])
-    return told[1]
+    put_in(search, reported[0])
+    return reported[1]
 
 
 def put_in(search: Search, found: SurfaceField) -> None:

@@ -119,14 +119,14 @@ def _limits(robot: UniversalRobot, limits: JointLimits | None) -> list[Finding]:
     """Joint limits of the safety settings, where the controller tells them."""
     try:
         named = arm(robot.model or "")
-        told = read_kinematics(robot.address)
+        reported = read_kinematics(robot.address)
     except (UnknownArm, DeviceError):
         return []
-    if told is None or told.joint_limits_rad is None:
+    if reported is None or reported.joint_limits_rad is None:
         return []
     if limits is not None:
         named = replace(named, limits_rad=limits.narrowed(named.limits_rad))
-    wrong = limits_differ(named, {"kinematics": vars(told)})
+    wrong = limits_differ(named, {"kinematics": vars(reported)})
     return [
         Finding(
             "UR joint limits", not wrong, "; ".join(wrong) or "as wide as the cell's", "see there"

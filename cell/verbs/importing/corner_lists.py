@@ -185,8 +185,10 @@ def listed_corners(
     known = orders(board)
     px = {k: listed[known[chosen.get(k) or usual]] for k, listed in frames.items()}
     rejected = {k: "is not in the list of corners" for k in range(len(pictures)) if k not in px}
-    said = ", ".join(f"{name} ({count})" for name, count in counted.most_common())
-    note = f"corners of {len(px)} pictures come from {path.name}; by the pictures they stand {said}"
+    stated = ", ".join(f"{name} ({count})" for name, count in counted.most_common())
+    note = (
+        f"corners of {len(px)} pictures come from {path.name}; by the pictures they stand {stated}"
+    )
     return Corners(px=px, rejected=rejected), (note,)
 
 

@@ -93,8 +93,8 @@ def why_not(cell: CellFile) -> str:
         example = example or words
     free = met.pop("", 0)
     parts = [f"{count} {reason}" for reason, count in met.most_common()]
-    told = f"of {free + met.total()} views tried over the distances {free} can be taken"
-    lines = [", ".join([told, *parts]) + (f" (such as: {example})" if example else "")]
+    reported = f"of {free + met.total()} views tried over the distances {free} can be taken"
+    lines = [", ".join([reported, *parts]) + (f" (such as: {example})" if example else "")]
     at_home = _seen_from_home(cell, guard)
     return "; ".join([*lines, *([at_home] if at_home else [])])
 

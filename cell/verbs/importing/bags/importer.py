@@ -76,7 +76,7 @@ def import_bag(
         robot = find_robot(contents, described.robot, stated.base, stated.flange)
         header = _header(source, described, contents, robot, _size(bag, contents))
         plan = _plan(bag, contents, robot, described, header.board.board())
-        header = _told(header, robot, plan)
+        header = _import_record(header, robot, plan)
         with TemporaryDirectory() as temporary:
             _write(bag, folder, _with_description(header, robot, Path(temporary)), robot, plan)
     recording = read_recording(folder)
@@ -224,7 +224,7 @@ def _header(
     return Header.model_validate(data)
 
 
-def _told(header: Header, robot: Robot, plan: _Plan) -> Header:
+def _import_record(header: Header, robot: Robot, plan: _Plan) -> Header:
     """The header with what was concluded."""
     known = dict((header.model_extra or {})["imported"])
     known |= {"clock_offset_s": plan.offset_s, "guessed": list(plan.notes)}

@@ -21,7 +21,7 @@ def image_topic(bag: Bag, stated: str | None) -> Topic:
     """The topic of the pictures; raises `InputError` with the list where several can be meant."""
     able = _of(bag, IMAGE, COMPRESSED)
     if stated is not None:
-        return _said(bag, stated, able, "--image-topic")
+        return _stated(bag, stated, able, "--image-topic")
     likely = [topic for topic in able if not _NO_PICTURE.search(topic.name)] or able
     # the same pictures, once as they are and once compressed
     raw = {topic.name for topic in likely if topic.type == IMAGE}
@@ -41,7 +41,7 @@ def joint_topic(bag: Bag, stated: str | None) -> Topic | None:
     """The topic of the joints, None where there is none; raises `InputError` for several."""
     able = _of(bag, JOINTS)
     if stated is not None:
-        return _said(bag, stated, able, "--joint-topic")
+        return _stated(bag, stated, able, "--joint-topic")
     usual = [topic for topic in able if topic.name == "/joint_states"]
     if usual or len(able) <= 1:
         return next(iter(usual or able), None)
@@ -76,7 +76,7 @@ def _of(bag: Bag, *types: str) -> list[Topic]:
     return [topic for topic in bag.topics.values() if topic.type in types]
 
 
-def _said(bag: Bag, stated: str, able: Sequence[Topic], option: str) -> Topic:
+def _stated(bag: Bag, stated: str, able: Sequence[Topic], option: str) -> Topic:
     found = [topic for topic in able if topic.name == stated]
     if found:
         return found[0]
