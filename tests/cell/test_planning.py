@@ -272,6 +272,16 @@ def test_a_board_out_of_reach_is_said() -> None:
     assert "the board is not in view from home: its middle is" in str(refused.value)
 
 
+@pytest.mark.parametrize("by_hand", [False, True])
+def test_a_board_too_large_for_the_picture_is_said(by_hand: bool) -> None:
+    """There is no view to wait for: a plan for a lens so long once never came."""
+    cell = read_cell(CONFIGS / "ur3-robotiq.cell.yaml")
+    data = cell.model_dump(by_alias=True, mode="json")
+    data["layout"]["alpha_px"] = 20_000.0
+    with pytest.raises(InputError, match="does the picture hold the whole board"):
+        design_plan(CellFile.model_validate(data), PlanSize(by_hand=by_hand))
+
+
 def test_the_cell_of_the_documentation_can_be_planned() -> None:
     page = (CONFIGS.parent / "docs" / "plan-and-cell-files.md").read_text()
     text = page.split("## The cell\n\n```yaml\n")[1].split("```")[0]

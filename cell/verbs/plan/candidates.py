@@ -16,6 +16,8 @@ TILT_RAD = (np.radians(12.0), np.radians(42.0))
 _SHARES = np.linspace(0.9, 0.0, 10)
 """Of the way from the image's middle to its edge, for the board's centre."""
 
+_MOST_MISSES = 500
+
 BY_HAND_TILT_RAD = (np.radians(15.0), np.radians(3.0))
 """Tilt of the nearest and of the farthest view when a board is photographed by hand."""
 
@@ -34,7 +36,9 @@ def parallel(
 def varied(
     sight: PlannedCamera, distances_m: tuple[float, float], seed: int, *, by_hand: bool = False
 ) -> Iterator[RigidTransform]:
-    """Endless tilted views (camera_from_board), spread evenly over what may vary.
+    """Tilted views (camera_from_board), spread evenly over what may vary, as many as are asked for.
+
+    It ends where the camera does not see the board whole in five hundred tries one after another.
 
     `by_hand`: most of them near and tilted, the far ones flat, as a board is photographed by
     hand. Perspective then comes from the near views, and a lens that breathes biases Zhang's fit
@@ -43,7 +47,8 @@ def varied(
     from scipy.stats import qmc  # a second's import, for plans only
 
     spread = qmc.Halton(5, seed=seed)
-    while True:
+    misses = 0
+    while misses < _MOST_MISSES:
         tilt, azimuth, roll, far, corner = spread.random()[0]
         axis = np.array([np.cos(2 * np.pi * azimuth), np.sin(2 * np.pi * azimuth), 0.0])
         far = far**3 if by_hand else far
@@ -54,6 +59,7 @@ def varied(
         turn = Rotation.from_rotvec([0.0, 0.0, 2 * np.pi * roll]) * turn
         distance = distances_m[0] + far * (distances_m[1] - distances_m[0])
         view = _pushed_aside(sight, turn, distance, 2 * np.pi * corner)
+        misses = misses + 1 if view is None else 0
         if view is not None:
             yield view
 

@@ -92,6 +92,11 @@ def why_not(cell: CellFile) -> str:
         met[reason] += 1
         example = example or words
     free = met.pop("", 0)
+    if not free + met.total():
+        return (
+            "at none of these distances does the picture hold the whole board: it takes a shorter"
+            " focal length, a smaller board or larger `layout.distances_m`"
+        )
     parts = [f"{count} {reason}" for reason, count in met.most_common()]
     reported = f"of {free + met.total()} views tried over the distances {free} can be taken"
     lines = [", ".join([reported, *parts]) + (f" (such as: {example})" if example else "")]
