@@ -51,6 +51,7 @@ def missed(model: CellModel, true: FloatArray) -> float:
     ("spoilt", "site"),
     [(dented, "image_field"), (bumped, "board_height")],
     ids=["image field", "board height"],
+)
 def test_a_field_is_carried_and_predicts_frames_that_were_not_fitted(spoilt, site):
     fitter = Fitter(spoilt(FITTED, True))
     search = Search(fitter.fit(plain_cell(), NOISE), fitter)
