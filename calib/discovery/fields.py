@@ -90,6 +90,13 @@ def field_scores(fit: JointFit, views: Views) -> list[FieldScore]:
     ]
 
 
+def frame_scores(fit: JointFit, views: Views, site: str) -> FloatArray:
+    """(N, R) what every frame by itself asks of a field, in directions that are independent."""
+    fields = _fields(fit.dependence, views, _ORDER)
+    columns = fields.image if site == IMAGE_FIELD else fields.height
+    return _Test(fit, fields.base).frame_scores(columns)
+
+
 def picture_score(fit: JointFit, views: Views, present: Present, site: str) -> Score:
     """What an effect would gain in the pictures alone, once a field is allowed for.
 
@@ -157,18 +164,31 @@ class _Test:
 
     def score(self, columns: FloatArray) -> Score:
         """Test a group of (N, M, 2, F) columns."""
-        n, m = self.weight.shape
-        rows = columns.reshape(n, 2 * m, -1) * self.scale[:, :, None]
-        flat = self._clean(rows)
-        u, s, vt = np.linalg.svd(flat, full_matrices=False)
-        kept = s > 1e-6 * s[0]
-        along = u[:, kept].T @ self.residual
-        gain, rank = float(along @ along), int(kept.sum())
+        n, _ = self.weight.shape
+        u, s, vt = self._directions(columns)
+        along = u.T @ self.residual
+        gain, rank = float(along @ along), len(s)
         freedom = max(2 * int((self.weight > 0).sum()) - 6 * n - rank, 4)
         noise = max((float(self.residual @ self.residual) - gain) / freedom, 1e-12)
         p = f_tail(gain / noise / rank, rank, freedom)
-        step = vt[kept].T @ (along / s[kept])
+        step = vt.T @ (along / s)
         return Score(gain / noise, rank, p, step)
+
+    def frame_scores(self, columns: FloatArray) -> FloatArray:
+        """(N, R) of each frame for the directions of a group of (N, M, 2, F) columns."""
+        n, m = self.weight.shape
+        u, _, _ = self._directions(columns)
+        return np.einsum(
+            "nmr,nm->nr", u.reshape(n, 2 * m, -1), self.residual.reshape(n, 2 * m), optimize=True
+        )
+
+    def _directions(self, columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What of the columns nothing else can absorb: (2NM, R), (R,) sizes, (R, F)."""
+        n, m = self.weight.shape
+        rows = columns.reshape(n, 2 * m, -1) * self.scale[:, :, None]
+        u, s, vt = np.linalg.svd(self._clean(rows), full_matrices=False)
+        kept = s > 1e-6 * s[0]
+        return u[:, kept], s[kept], vt[kept]
 
     def of(self, columns: FloatArray, pixels: FloatArray) -> tuple[Score, str]:
         """Score a field over the image; where it is largest."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from calib.discovery.fields import frame_scores
 from calib.discovery.laws.frames import frame_blocks, inverse_root
 from calib.discovery.locate import Cell
 from calib.solver.joint import JointFit
@@ -19,14 +20,17 @@ _STANDS_OUT = 3.5
 
 
 def stands_out(fit: JointFit, views: Views, cell: Cell) -> bool:
-    """Whether different frames agree on a curve, beyond what each asks for by itself.
+    """Whether different frames agree on a curve or a field, beyond what each asks for by itself.
 
     The products of the scores of different frames are zero on average where nothing is there,
     however large and however alike within a frame the errors are.
     """
-    if cell.curve is None:
+    if cell.is_field:
+        scores = frame_scores(fit, views, cell.site)
+    elif cell.curve is not None:
+        scores = _frame_scores(fit, views, cell)
+    else:
         return True
-    scores = _frame_scores(fit, views, cell)
     products = scores @ scores.T
     np.fill_diagonal(products, 0.0)
     chance = float(np.sqrt(2.0 * (products**2).sum()))
