@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -128,17 +128,19 @@ def with_effects(plan: Plan, effects: tuple[str, ...]) -> Plan:
     parsed = tuple(parse_effect(text) for text in effects)
     for effect in parsed:
         if effect.name not in MIXUPS:
-            _require_amount(present_effect(effect, "--effect"))
+            _require_amount(present_effect(effect, "--effect"), given=effect.parameters)
     return with_truth(plan, truth.model_copy(update={"effects": parsed}))
 
 
-def _require_amount(effect: Present) -> None:
-    """Refuse an effect whose every amount is zero: the simulation would be that without it."""
-    if not effect.absent:
+def _require_amount(effect: Present, given: Collection[str]) -> None:
+    """Refuse an effect without any amount: the simulation would be that without it.
+
+    A zero that was given is meant: it takes the cell's own effects away.
+    """
+    parameters = [p for p in effect.effect.parameters if p.role == "amount"]
+    if not effect.absent or any(p.name.startswith(tuple(given)) for p in parameters):
         return
-    amounts = [
-        f"{p.name}=NUMBER ({p.unit})" for p in effect.effect.parameters if p.role == "amount"
-    ]
+    amounts = [f"{p.name}=NUMBER ({p.unit})" for p in parameters]
     raise InputError(
         f"--effect {effect.effect.name}: has no amount and would change nothing; say how large it"
         f" is: --effect {effect.effect.name}:{' or '.join(amounts[:6])}"
