@@ -31,7 +31,7 @@ demo-discovery: $(STAMP)  ## physics that no catalogue has, found as a law and p
 test: $(STAMP) lint types layers docs  ## lint, types, layers, docs and every test
 	tools/install-debian-packages test
 	tools/install-mrcal
-	$(BIN)/python -m pytest -n 3 --dist loadgroup
+	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
 
 test-fast: $(STAMP) lint types layers  ## lint, types, layers, and the tests that take a moment
 	$(BIN)/python -m pytest -n 2 $(FAST)

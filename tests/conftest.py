@@ -26,8 +26,9 @@ MAY_SKIP = (
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Long tests and those that stay together come first: at the end no process waits for them."""
-    items.sort(key=lambda item: not {"xdist_group", "slow"} & {m.name for m in item.iter_markers()})
+    """Files with long tests come first: at the end no process waits for them."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
 
 
 def _refuse(report: pytest.TestReport | pytest.CollectReport) -> None:

@@ -24,6 +24,8 @@ from drivers.errors import SafetyError, StopFailed
 from sim.arm import SimArm
 from tests.bootstrap.trials import Wrong, eye_to_hand, irb140, run_trial, ur3
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(
     ("cell", "seed"),

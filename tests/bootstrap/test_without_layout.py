@@ -16,6 +16,8 @@ from cell.verbs.bootstrap.near_guard import carried_uncertainty_m
 from sim.arm import SimArm
 from tests.bootstrap.trials import eye_to_hand, run_trial, ur3
 
+pytestmark = pytest.mark.slow
+
 
 def without_layout(cell: CellFile, pixel_um: float) -> tuple[CellFile, tuple[float, ...]]:
     """The cell with its lens' scale factor only, and where the arm stood."""

@@ -24,6 +24,7 @@ from sim.clock import WallClock
 from sim.peers.abb import ABBController
 from sim.peers.callable_camera import CallableCamera
 from sim.peers.gige import GigEPeer
+from sim.peers.loopback import own_address
 from sim.peers.robotiq import RobotiqPeer
 from sim.peers.ur import URController
 from tests.cell.plans import CELL
@@ -99,7 +100,7 @@ def standing(model: str) -> SimArm:
 def ur() -> Iterator[URController]:
     arm = standing("ur5e")
     kinematics = kinematics_of("ur5e")
-    with URController(arm, "127.0.0.78", kinematics=kinematics) as controller:
+    with URController(arm, own_address(), kinematics=kinematics) as controller:
         yield controller
 
 
@@ -123,7 +124,7 @@ def test_polyscope_5_and_polyscope_x_are_told_apart(tmp_path: Path, ur: URContro
         in by_name(examine(ur_cell(tmp_path, ur)), "UR controller").line()
     )
     arm = standing("ur5e")
-    with URController(arm, "127.0.0.79", robot_api_port=8080) as newer:
+    with URController(arm, own_address(), robot_api_port=8080) as newer:
         cell = cell_with(
             tmp_path,
             f"{{driver: ur, model: ur5e, address: {newer.address}, robot_api_port: 8080}}",
@@ -152,7 +153,7 @@ def test_a_protective_stop_and_a_tool_in_millimetres_are_named(
     ur.tcp_offset = (0.0, 0.0, 150.0, 0.0, 0.0, 0.0)
     findings = examine(ur_cell(tmp_path, ur))
     assert by_name(findings, "UR safety").blocks
-    assert "slip of units" in by_name(findings, "UR tool").line()
+    assert "mistake of units" in by_name(findings, "UR tool").line()
 
 
 def test_settings_that_differ_from_the_cell_file_are_in_the_way(
@@ -176,7 +177,7 @@ def test_settings_that_differ_from_the_cell_file_are_in_the_way(
 @pytest.fixture
 def abb() -> Iterator[ABBController]:
     arm = standing("irb140")
-    with ABBController(arm, "127.0.0.80") as controller:
+    with ABBController(arm, own_address()) as controller:
         yield controller
 
 
@@ -215,7 +216,7 @@ def test_a_controller_that_does_not_watch_the_link_is_named(
 def test_robotware_6_and_robotware_7_are_told_apart(tmp_path: Path, abb: ABBController) -> None:
     assert "RobotWare 6" in by_name(examine(abb_cell(tmp_path, abb)), "ABB controller").line()
     arm = standing("irb140")
-    with ABBController(arm, "127.0.0.81", omnicore=True) as newer:
+    with ABBController(arm, own_address(), omnicore=True) as newer:
         login = by_name(examine(abb_cell(tmp_path, newer)), "ABB login")
         assert login.blocks
         shown = certificate_of(newer.address, newer.port)
@@ -241,7 +242,7 @@ def gige() -> Iterator[GigEPeer]:
     def picture(camera: CallableCamera) -> np.ndarray:
         return np.zeros((48, 64), np.uint8)
 
-    with GigEPeer(CallableCamera(picture), 64, 48, address="127.0.0.79", model="Eye1") as peer:
+    with GigEPeer(CallableCamera(picture), 64, 48, address=own_address(), model="Eye1") as peer:
         yield peer
 
 

@@ -28,6 +28,8 @@ from cell.verbs.plan.tour import nearest_next, shortened, shortest_tour
 from sim import presets
 from tests.cell.plans import CELL
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).parents[2] / "configs"
 NAMES = ("irb140-eosens", "ur3-robotiq")
 STEEPEST_DEG = {"irb140-eosens": (35.0, 42.1), "ur3-robotiq": (28.0, 42.1)}

@@ -24,8 +24,7 @@ from cell.verbs.diagnose.twin import twin_text
 from sim.synthesize import synthesize
 from tests.discovery.simulated_runs import log, plain_cell, record, recording
 
-# what one test found serves two more: all in one process
-pytestmark = pytest.mark.xdist_group("twin of every effect")
+pytestmark = pytest.mark.slow
 
 FRAMES = 30
 EFFECTS = {effect.label: effect for effect in catalogue()}

@@ -16,6 +16,8 @@ from calib.solver.noise import Noise
 from calib.views import Views
 from tests.discovery.simulated_runs import NOISE, log, plain_cell, record
 
+pytestmark = pytest.mark.slow
+
 LOG = log(32)
 CLEAN = record(plain_cell(), LOG, seed=21)
 

@@ -13,9 +13,12 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pyarrow.parquet as pq
+import pytest
 
 from cell.verbs.study.folder import RESULTS
 from tests.study.studies import seeds, write_study
+
+pytestmark = pytest.mark.slow
 
 Process = subprocess.Popen[bytes]
 CELL = "from cell.cli import main; main()"

@@ -34,6 +34,8 @@ from cell.verbs.study.trial import truth_of
 from tests.study.killers import KILLER, kill_or_work
 from tests.study.studies import seeds, study, write_plan, write_study
 
+pytestmark = pytest.mark.slow
+
 CommandResult = tuple[int, str, str]
 Cell = Callable[..., CommandResult]
 

@@ -176,7 +176,8 @@ def test_a_controller_that_never_answers_is_told_as_such_and_freezes_nothing():
 @contextmanager
 def frozen_in_constructor():
     """A UR arm whose child is told to move and waits for ever in ur-rtde's constructor."""
-    with ur_moving(**PATIENT_UR) as (arm, controller, sim):
+    # five seconds of watchdog: the arm that is to move stands for so long on a busy machine
+    with ur_moving(**PATIENT_UR | {"watchdog_hz": 0.2}) as (arm, controller, sim):
         arm.stop()
         wait_steady(arm)
         controller.faults.ignore_new_clients = True

@@ -13,6 +13,8 @@ from benchmarks.fault_runs.faults import FAULTS, Fault, instants
 from benchmarks.fault_runs.stands import STANDS
 from benchmarks.fault_runs.trial import happening
 
+pytestmark = pytest.mark.slow
+
 SEED = 3
 LEFT_OUT = {
     # what one cell shows of our own process holds for the other
