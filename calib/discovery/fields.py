@@ -178,9 +178,8 @@ class _Test:
         """(N, R) of each frame for the directions of a group of (N, M, 2, F) columns."""
         n, m = self.weight.shape
         u, _, _ = self._directions(columns)
-        return np.einsum(
-            "nmr,nm->nr", u.reshape(n, 2 * m, -1), self.residual.reshape(n, 2 * m), optimize=True
-        )
+        by_frame, residual = u.reshape(n, 2 * m, -1), self.residual.reshape(n, 2 * m)
+        return np.asarray(np.einsum("nmr,nm->nr", by_frame, residual, optimize=True))
 
     def _directions(self, columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """What of the columns nothing else can absorb: (2NM, R), (R,) sizes, (R, F)."""
