@@ -25,6 +25,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from cell.errors import InputError
+from cell.storage.atomic import sync_folder
 from cell.storage.files.study_file import Study
 from cell.storage.incoming.text import read_json
 from cell.verbs.study.kinds import Row
@@ -61,7 +62,7 @@ class _Table:
         # a hard link refuses where a file is, a rename would take its place
         os.link(partial, part)
         partial.unlink()
-        _sync(self._path)
+        sync_folder(self._path)
         self._next += 1
 
     def _parts(self) -> list[Path]:
@@ -149,7 +150,7 @@ def _same_study(path: Path, study: Study) -> None:
             file.flush()
             os.fsync(file.fileno())
         partial.replace(manifest)
-        _sync(path)
+        sync_folder(path)
         return
     before = read_json(manifest)
     schema = before.get("schema") if isinstance(before, dict) else None
@@ -188,11 +189,3 @@ def _read(part: Path, columns: list[str] | None) -> pa.Table:
         return pq.ParquetFile(part).read(columns=columns)
     except (OSError, pa.ArrowInvalid) as broken:
         raise InputError(f"{part}: is no whole Parquet file ({broken}); move it away") from None
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
