@@ -14,11 +14,10 @@ measure but false names.
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -26,6 +25,7 @@ import numpy as np
 
 from benchmarks.discovery.faults import FAULTS
 from benchmarks.discovery.oracle import Oracle, consult
+from benchmarks.discovery.outcomes import Outcome, append_outcome, read_outcomes
 from benchmarks.discovery.physics import CATALOGUE, OUTSIDE, Physics, present
 from benchmarks.discovery.recordings import Concealed, conceal
 from benchmarks.discovery.world import BOARDS, CAMERAS
@@ -112,31 +112,6 @@ def views_of(case: Concealed, rows: np.ndarray) -> Views:
         robot_model=case.cell.arm,
         payload_kg=0.9,
     )
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What came of a case; px are RMS over the corners of frames never shown, noise free."""
-
-    kind: str
-    name: str
-    board: str
-    noise: str
-    background: bool
-    detectable: bool
-    verdict: str
-    names: list[str]
-    right: bool
-    false_names: list[str]
-    from_frame_right: bool | None
-    link_right: bool | None
-    covariate_right: bool | None
-    form_right: bool | None
-    before_px: float
-    after_px: float
-    plain_px: float
-    oracle_px: float
-    cpu_s: float
 
 
 @contextmanager
@@ -339,11 +314,7 @@ def main() -> None:
         parser.add_argument(f"--{kind}", type=int, default=0, metavar="N")
     parser.add_argument("--results", type=Path, default=Path("discovery-benchmark.jsonl"))
     asked = parser.parse_args()
-    done: dict[str, Outcome] = {}
-    if asked.results.exists():
-        for line in asked.results.read_text(encoding="utf-8").splitlines():
-            outcome = Outcome(**json.loads(line))
-            done[outcome.name] = outcome
+    done = read_outcomes(asked.results)
     for kind, count in (
         ("clean", asked.clean),
         ("catalogue", asked.catalogue),
@@ -356,8 +327,7 @@ def main() -> None:
             if case.name in done:
                 continue
             outcome = done[case.name] = run(case)
-            with asked.results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(asdict(outcome)) + "\n")
+            append_outcome(asked.results, outcome)
             mark = "ok " if outcome.right or _is_clean(outcome) else "BAD"
             print(
                 f"{mark} {outcome.name}: {outcome.verdict} {outcome.names}"

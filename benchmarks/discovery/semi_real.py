@@ -14,17 +14,16 @@ from __future__ import annotations
 
 import argparse
 import csv
-import json
 import zlib
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from benchmarks.discovery.outcomes import Outcome, append_outcome, read_outcomes
 from benchmarks.discovery.physics import CATALOGUE, Physics
 from benchmarks.discovery.recordings import conceal
-from benchmarks.discovery.run import BACKGROUND, Case, Outcome, diagnosed
+from benchmarks.discovery.run import BACKGROUND, Case, diagnosed
 from benchmarks.discovery.world import HOME, Array, State, rigid
 
 ARM_FIELD = "the arm's measured error"
@@ -141,18 +140,13 @@ def main() -> None:
     asked = parser.parse_args()
     arm = MeasuredArm(asked.pose_errors)
     print(f"length scale {arm.length_rad:g} rad, share {arm.share:g}")
-    done: dict[str, Outcome] = {}
-    if asked.results.exists():
-        for line in asked.results.read_text(encoding="utf-8").splitlines():
-            outcome = Outcome(**json.loads(line))
-            done[outcome.name] = outcome
+    done = read_outcomes(asked.results)
     for index in range(asked.cases):
         if f"semi-real {index}" in done:
             continue
         outcome = run_case(arm, index)
         done[outcome.name] = outcome
-        with asked.results.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(asdict(outcome)) + "\n")
+        append_outcome(asked.results, outcome)
         print(
             f"{outcome.name}: {outcome.verdict} {outcome.names} false {outcome.false_names}"
             f" {outcome.before_px:.2f} -> {outcome.after_px:.2f} px (oracle"

@@ -10,22 +10,20 @@ and the arm must stand. Times are from the push, or from the first motion of the
 
 from __future__ import annotations
 
-import argparse
 import random
 import re
-import sys
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks.fault_runs.launch import Launch
-from benchmarks.fault_runs.stands import STANDS, Stand
-from benchmarks.fault_runs.stops import StopTrial, home, moving, seen_through, slow_stand, worst
+from benchmarks.fault_runs.stands import Stand
+from benchmarks.fault_runs.stop_table import Judged, print_table, worst
+from benchmarks.fault_runs.stops import StopTrial, home, moving, seen_through, slow_stand
 
 _SPEED_DEG_S = 10.0
 _SAFETY = 5
@@ -161,9 +159,17 @@ def trials_of(
     return found
 
 
-def _row(name: str, kind: Disturbance, trials: list[StopTrial]) -> str:
-    good = sum(not complaints(kind, trial) for trial in trials)
-    cells = [
+def _judged(
+    stand: Stand, folder: Path, name: str, kind: Disturbance, count: int, seed: int
+) -> Judged[StopTrial]:
+    trials = trials_of(stand, folder, name, kind, count, seed)
+    return [(trial, complaints(kind, trial)) for trial in trials]
+
+
+def _row(name: str, kind: Disturbance, found: Judged[StopTrial]) -> list[str]:
+    trials = [trial for trial, _ in found]
+    good = sum(not complaints for _, complaints in found)
+    return [
         name,
         kind.name,
         f"{good} of {len(trials)}",
@@ -172,40 +178,26 @@ def _row(name: str, kind: Disturbance, trials: list[StopTrial]) -> str:
         worst([trial.report_s for trial in trials]),
         ", ".join(sorted({str(trial.exit_status) for trial in trials})),
     ]
-    return f"| {' | '.join(cells)} |"
 
 
 def main() -> None:
     """Print the table; exit status 1 unless everything was as it must be."""
-    asked = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    asked.add_argument("--stand", choices=STANDS)
-    asked.add_argument("--only", default="")
-    asked.add_argument("--instants", type=int, default=10)
-    asked.add_argument("--seed", type=int, default=1)
-    words: Any = asked.parse_args()
-    bad = 0
-    print(
-        "| cell | the arm | stopped and told | stop order, worst | halt, worst | word, worst"
-        " | exit |\n|---|---|---|---|---|---|---|"
+    print_table(
+        (__doc__ or "").splitlines()[0],
+        (
+            "cell",
+            "the arm",
+            "stopped and told",
+            "stop order, worst",
+            "halt, worst",
+            "word, worst",
+            "exit",
+        ),
+        DISTURBANCES,
+        partial(slow_stand, joint_speed_deg_s=_SPEED_DEG_S),
+        _judged,
+        _row,
     )
-    for name in STANDS:
-        if words.stand not in (None, name):
-            continue
-        with (
-            tempfile.TemporaryDirectory() as folder,
-            slow_stand(name, Path(folder), _SPEED_DEG_S) as stand,
-        ):
-            for kind in DISTURBANCES:
-                if words.only not in kind.name:
-                    continue
-                trials = trials_of(stand, Path(folder), name, kind, words.instants, words.seed)
-                print(_row(name, kind, trials), flush=True)
-                for trial in trials:
-                    for complaint in complaints(kind, trial):
-                        bad += 1
-                        print(f"{name}: {kind.name}: {complaint}\n{trial.output}", file=sys.stderr)
-                bad += words.instants - len(trials)
-    sys.exit(bool(bad))
 
 
 if __name__ == "__main__":

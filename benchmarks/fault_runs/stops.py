@@ -10,12 +10,9 @@ true readings of it; in all other cases the alarm is raised and the status is 5.
 
 from __future__ import annotations
 
-import argparse
 import json
 import random
 import signal
-import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -28,6 +25,7 @@ import numpy as np
 
 from benchmarks.fault_runs.launch import Launch
 from benchmarks.fault_runs.stands import ABB, STANDS, UR, Stand
+from benchmarks.fault_runs.stop_table import Judged, print_table, worst
 from cell.sequencer.journal import read_journal
 from cell.storage.files.plan_file import read_plan
 from drivers.arm import MoveTarget
@@ -216,10 +214,12 @@ def _report_s(folder: Path, asked_unix_s: float, ended_s: float) -> float:
     return at_s if at_s >= 0.0 else ended_s
 
 
-def stops_of(stand: Stand, folder: Path, name: str, kind: Kind, count: int, seed: int) -> list[Any]:
+def stops_of(
+    stand: Stand, folder: Path, name: str, kind: Kind, count: int, seed: int
+) -> Judged[StopTrial]:
     """The same kind at random instants, the same ones every time; (trial, complaints) each."""
     chance = random.Random(f"{seed} {name} {kind.name}")
-    found: list[Any] = []
+    found: Judged[StopTrial] = []
     for number in range(_TRIES * count):
         if len(found) == count:
             break
@@ -230,18 +230,11 @@ def stops_of(stand: Stand, folder: Path, name: str, kind: Kind, count: int, seed
     return found
 
 
-def worst(values: list[float | None]) -> str:
-    reported = [value for value in values if value is not None]
-    missing = len(values) - len(reported)
-    worst = f"{max(reported):.3f} s" if reported else "-"
-    return f"{worst}, {missing} never" if reported and missing else worst
-
-
-def _row(name: str, kind: Kind, found: list[Any]) -> str:
+def _row(name: str, kind: Kind, found: Judged[StopTrial]) -> list[str]:
     trials = [trial for trial, _ in found]
     good = sum(not complaints for _, complaints in found)
     confirmed = sum(trial.exit_status == _STOPPED for trial in trials)
-    cells = [
+    return [
         name,
         kind.name,
         f"{good} of {len(found)}",
@@ -251,37 +244,27 @@ def _row(name: str, kind: Kind, found: list[Any]) -> str:
         worst([trial.report_s for trial in trials]),
         ", ".join(sorted({str(trial.exit_status) for trial in trials})),
     ]
-    return f"| {' | '.join(cells)} |"
 
 
 def main() -> None:
     """Print the table; exit status 1 unless everything was as it must be."""
-    asked = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    asked.add_argument("--stand", choices=STANDS)
-    asked.add_argument("--only", default="")
-    asked.add_argument("--instants", type=int, default=10)
-    asked.add_argument("--seed", type=int, default=1)
-    words = asked.parse_args()
-    bad = 0
-    print(
-        "| cell | the stop is | told as it was | confirmed | order at the controller, worst"
-        " | halt, worst | word, worst | exit |\n|---|---|---|---|---|---|---|---|"
+    print_table(
+        (__doc__ or "").splitlines()[0],
+        (
+            "cell",
+            "the stop is",
+            "told as it was",
+            "confirmed",
+            "order at the controller, worst",
+            "halt, worst",
+            "word, worst",
+            "exit",
+        ),
+        KINDS,
+        slow_stand,
+        stops_of,
+        _row,
     )
-    for name in STANDS:
-        if words.stand not in (None, name):
-            continue
-        with tempfile.TemporaryDirectory() as folder, slow_stand(name, Path(folder)) as stand:
-            for kind in KINDS:
-                if words.only not in kind.name:
-                    continue
-                found = stops_of(stand, Path(folder), name, kind, words.instants, words.seed)
-                print(_row(name, kind, found), flush=True)
-                for trial, complaints in found:
-                    bad += bool(complaints)
-                    for complaint in complaints:
-                        print(f"{name}: {kind.name}: {complaint}\n{trial.output}", file=sys.stderr)
-                bad += words.instants - len(found)
-    sys.exit(bool(bad))
 
 
 if __name__ == "__main__":
