@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
+from calib.chain.kinematics import MODELS
 from cell.cli.app import VERBS, app
 from cell.errors import EXIT_SAFETY
 from cell.storage.files.plan_file import read_plan
@@ -20,6 +21,7 @@ from tools import reference_pages
 from tools.effect_pages import FOLDER, pages
 
 README = ROOT / "README.md"
+CELL_FILES = ROOT / "docs/plan-and-cell-files.md"
 PAGES = sorted([README, ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.md")])
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
 _INDENTED = re.compile(r"^ {4}(cell .*)$", re.MULTILINE)
@@ -51,6 +53,13 @@ def test_the_readme_names_every_verb_and_exit_status() -> None:
     assert re.findall(r"^\| `cell (\w+)", text, re.MULTILINE) == list(VERBS)
     statuses = re.findall(r"^\| (\d) \| ", text, re.MULTILINE)
     assert statuses == [str(k) for k in range(EXIT_SAFETY + 1)]
+
+
+def test_the_readme_and_the_cell_files_page_name_every_arm() -> None:
+    supported = README.read_text().split("## What is supported")[1].split("\n## ")[0]
+    (row,) = re.findall(r"^\| `robot.model` \|.*$", CELL_FILES.read_text(), re.MULTILINE)
+    for text in (supported, row):
+        assert set(re.findall(r"\b(?:ur\d\w*|irb\d\w*)\b", text)) == set(MODELS)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)
