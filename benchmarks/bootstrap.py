@@ -37,12 +37,12 @@ def main() -> None:
     asked.add_argument("--cells", nargs="*", choices=CELLS, default=list(CELLS))
     asked.add_argument("--pictures", action="store_true", help="whole dry runs")
     asked.add_argument("--worn", action="store_true", help="joints that are off, a soft bracket")
-    words = asked.parse_args()
-    for name in words.cells:
+    options = asked.parse_args()
+    for name in options.cells:
         with tempfile.TemporaryDirectory() as folder:
-            seeds = range(words.first, words.first + words.seeds)
+            seeds = range(options.first, options.first + options.seeds)
             trials = [
-                _trial(name, seed, Path(folder), worn=words.worn, pictures=words.pictures)
+                _trial(name, seed, Path(folder), worn=options.worn, pictures=options.pictures)
                 for seed in seeds
             ]
             _sum_up(name, trials)

@@ -77,8 +77,8 @@ def still_open(connection: socket.socket) -> bool:
 @contextmanager
 def flooded(url: str) -> Iterator[None]:
     parts = urlsplit(url)
-    words = [sys.executable, __file__, "--flood", f"{parts.hostname}:{parts.port}"]
-    with subprocess.Popen(words) as strangers:
+    command = [sys.executable, __file__, "--flood", f"{parts.hostname}:{parts.port}"]
+    with subprocess.Popen(command) as strangers:
         time.sleep(2.0)
         try:
             yield
@@ -176,9 +176,9 @@ def main() -> None:
         middle = statistics.median(ratios)
         print(f"ratio, median of {len(ratios)} pairs: {middle:.3f} ", end="")
         print(f"(from {min(ratios):.3f} to {max(ratios):.3f})", flush=True)
-        for kept, words in ((True, "the connection it has"), (False, "a new connection")):
+        for kept, connection in ((True, "the connection it has"), (False, "a new connection")):
             took = [stop_s(plan, folder, kept=kept) for _ in range(asked.presses)]
-            print(f"Stop from a tablet over {words}: {[round(1e3 * t, 1) for t in took]} ms")
+            print(f"Stop from a tablet over {connection}: {[round(1e3 * t, 1) for t in took]} ms")
 
 
 if __name__ == "__main__":

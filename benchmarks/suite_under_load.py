@@ -46,10 +46,10 @@ def load(busy: int) -> Iterator[None]:
             process.join()
 
 
-def run(words: list[str]) -> tuple[bool, str]:
+def run(arguments: list[str]) -> tuple[bool, str]:
     """Run pytest once; returns whether all passed, and the line of it."""
     began_s = time.monotonic()
-    command = [sys.executable, "-m", "pytest", "-rfE", *words]
+    command = [sys.executable, "-m", "pytest", "-rfE", *arguments]
     wide = os.environ | {"COLUMNS": "200"}  # or the reasons of failures are cut off
     run_ = subprocess.run(command, cwd=ROOT, env=wide, capture_output=True, text=True, check=False)
     counted = {what: int(count) for count, what in _COUNTED.findall(run_.stdout[-400:])}
@@ -72,7 +72,7 @@ def main() -> None:
     good = True
     with load(given.busy):
         for number in range(given.times):
-            passed, line = run(given.words)
+            passed, line = run(given.arguments)
             good = good and passed
             print(f"run {number + 1}: {line}", flush=True)
     sys.exit(not good)

@@ -27,17 +27,17 @@ def main() -> None:
     asked.add_argument("plan", type=Path)
     asked.add_argument("recording", type=Path)
     asked.add_argument("--transfer-s", type=float, required=True)
-    words = asked.parse_args()
-    plan = read_plan(words.plan)
-    frames = sorted(read_recording(words.recording).frames, key=lambda frame: frame.t_s)
+    options = asked.parse_args()
+    plan = read_plan(options.plan)
+    frames = sorted(read_recording(options.recording).frames, key=lambda frame: frame.t_s)
     guard = Guard.of(plan)
-    rows = np.array([_row(plan, guard, a, b, words.transfer_s) for a, b in pairwise(frames)])
+    rows = np.array([_row(plan, guard, a, b, options.transfer_s) for a, b in pairwise(frames)])
     taken, bound = rows.T
     print(f"{len(rows)} poses: {taken.sum():.1f} s against {bound.sum():.1f} s,", end=" ")
     print(f"ratio {taken.sum() / bound.sum():.3f};", end=" ")
     late = np.percentile(taken - bound, [50, 90, 100])
     print("over the bound by {:.3f} s (median), {:.3f} (90 %), {:.3f} (worst)".format(*late))
-    waited = sum(_picture_s(frame, words.transfer_s) for frame in frames[1:])
+    waited = sum(_picture_s(frame, options.transfer_s) for frame in frames[1:])
     print(f"{waited:.1f} s of that went by between order and arrival of the pictures")
 
 

@@ -242,18 +242,18 @@ def _length_factor(problem: _Problem, known: BoolArray, X: FloatArray) -> tuple[
 
 def _other_unit(ratio: float) -> tuple[str, str]:
     """What to say of positions that are `ratio` times as large as the board's metres."""
-    words = (
+    message = (
         "the logged positions and the board's squares disagree about length by a factor of"
         f" {ratio:.4g}"
     )
     for name, count in (("millimetres", 1000.0), ("centimetres", 100.0), ("inches", 1 / 0.0254)):
         if abs(np.log(ratio / count)) < _SAME_UNIT:
             return (
-                f"{words}: the positions are in {name}, under a key that says metres"
+                f"{message}: the positions are in {name}, under a key that says metres"
                 " (base_from_flange.p_m), or square_m is so many times too small",
                 f"write p_m in metres (divide by {count:.6g}), or mend square_m",
             )
-    return words, "check base_from_flange.p_m (metres) and the board's square_m"
+    return message, "check base_from_flange.p_m (metres) and the board's square_m"
 
 
 def _closed_form_robust(problem: _Problem, known: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -75,10 +75,10 @@ def _law(effect: Effect) -> str:
 
 
 def _row(p: Parameter) -> str:
-    words = _ROLES[p.role]
+    role = _ROLES[p.role]
     if not p.identifiable:
-        words = "simulated only: hand-eye or board pose absorb it"
-    return f"| `{p.name}` | {p.unit} | {p.typical:g} | {p.low:g}, {p.high:g} | {words} |"
+        role = "simulated only: hand-eye or board pose absorb it"
+    return f"| `{p.name}` | {p.unit} | {p.typical:g} | {p.low:g}, {p.high:g} | {role} |"
 
 
 def _needs(effect: Effect) -> str:

@@ -57,8 +57,8 @@ def _verbs() -> str:
 def _usage(name: str, verb: Any) -> str:
     given = [p for p in verb.params if p.param_type_name == "argument"]
     names = [(p.name.upper().strip("_"), p.required) for p in given]
-    words = [word if required else f"[{word}]" for word, required in names]
-    return " ".join(["cell", name, *words, "[OPTIONS]"])
+    usage = [word if required else f"[{word}]" for word, required in names]
+    return " ".join(["cell", name, *usage, "[OPTIONS]"])
 
 
 def _flags(parameter: Any) -> str:
@@ -141,8 +141,8 @@ def _bounds(of: Mapping[str, Any]) -> str:
     return "".join(f" {sign} {of[key]:g}" for key, sign in signs.items() if key in of)
 
 
-def _cell(words: str) -> str:
-    return " ".join(words.split()).replace("|", "\\|")
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
 
 
 def _python() -> str:

@@ -215,9 +215,9 @@ def _frame_right(concealed: Concealed, found: Diagnosis) -> bool | None:
         for name, value in effect.parameters.items()
         if name in ("at_frame", "from_frame")
     }
-    words = " ".join(effect.physics for effect in found.effects)
+    text = " ".join(effect.physics for effect in found.effects)
     inside = any(before < frame <= concealed.from_frame for frame in reported)
-    return inside or str(concealed.from_frame) in words
+    return inside or str(concealed.from_frame) in text
 
 
 def _miss(concealed: Concealed, found: Diagnosis, model: CellModel) -> float:

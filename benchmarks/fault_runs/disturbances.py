@@ -43,7 +43,7 @@ class Disturbance:
     ----------
     name:
         In the table.
-    words:
+    pattern:
         Pattern of what the operator must be told.
     prepare:
         Makes the controller ready for it.
@@ -54,7 +54,7 @@ class Disturbance:
     """
 
     name: str
-    words: str
+    pattern: str
     prepare: Callable[[Stand], None] = lambda stand: None
     push: Callable[[Stand], None] | None = None
     stands: bool = True
@@ -102,8 +102,8 @@ def complaints(kind: Disturbance, trial: StopTrial) -> list[str]:
     found = []
     if trial.exit_status != _SAFETY:
         found.append(f"exit status {trial.exit_status}, not {_SAFETY}")
-    if re.search(kind.words, trial.output) is None:
-        found.append(f"the operator is not told '{kind.words}'")
+    if re.search(kind.pattern, trial.output) is None:
+        found.append(f"the operator is not told '{kind.pattern}'")
     if kind.stands and trial.moving:
         found.append("the arm moved when the run said what became of it")
     if "Traceback" in trial.output:
@@ -152,9 +152,9 @@ def trials_of(
     for number in range(_TRIES * count):
         if len(found) == count:
             break
-        words = "-".join(re.findall(r"\w+", kind.name))
+        folder_name = "-".join(re.findall(r"\w+", kind.name))
         instant_s = chance.uniform(_FIRST_S, _LAST_S)
-        trial = trial_of(stand, folder / f"{words}-{number}", kind, instant_s)
+        trial = trial_of(stand, folder / f"{folder_name}-{number}", kind, instant_s)
         found += [] if trial is None else [trial]
     return found
 

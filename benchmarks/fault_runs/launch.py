@@ -29,14 +29,14 @@ class Launch:
     """
 
     def __init__(self, plan: Path, folder: Path) -> None:
-        words = ["run", str(plan), "-o", str(folder), "--record-only"]
+        arguments = ["run", str(plan), "-o", str(folder), "--record-only"]
         if folder.exists():
-            words.append("--resume")
+            arguments.append("--resume")
         self._folder = folder
         self._events_before = len(read_journal(folder))
         self._heard: list[bytes] = []
         here, there = _FORKS.Pipe(duplex=False)
-        self._process = _FORKS.Process(target=_cell, args=(words, there), daemon=True)
+        self._process = _FORKS.Process(target=_cell, args=(arguments, there), daemon=True)
         self._process.start()
         there.close()
         assert self._process.pid is not None
@@ -87,12 +87,12 @@ class Launch:
                 self._heard.append(chunk)
 
 
-def _cell(words: list[str], output: Connection) -> None:
+def _cell(arguments: list[str], output: Connection) -> None:
     os.dup2(output.fileno(), 1)
     os.dup2(output.fileno(), 2)
     output.close()
     os.setsid()
-    sys.argv = ["cell", *words]
+    sys.argv = ["cell", *arguments]
     from cell.cli import main
 
     main()

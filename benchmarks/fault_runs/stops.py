@@ -223,8 +223,8 @@ def stops_of(
     for number in range(_TRIES * count):
         if len(found) == count:
             break
-        words = "-".join(kind.name.replace(",", "").split())
-        trial = stop_trial(stand, folder / f"{words}-{number}", kind, chance.uniform(0.0, _LAST_S))
+        label = "-".join(kind.name.replace(",", "").split())
+        trial = stop_trial(stand, folder / f"{label}-{number}", kind, chance.uniform(0.0, _LAST_S))
         if trial is not None:
             found.append((trial, trial.complaints(kind, stand.maker)))
     return found

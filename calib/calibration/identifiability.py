@@ -68,14 +68,14 @@ def find_weaknesses(joint: JointFit, views: Views) -> tuple[Weakness, ...]:
     if not len(weak):
         return ()
     kinds = _more_views(joint, views)
-    added = {words: _information(joint, more)[0] * both for words, more in kinds}
+    added = {remedy: _information(joint, more)[0] * both for remedy, more in kinds}
     found = []
     for k in weak:
         u = vector[:, k]
         order = np.argsort(-np.abs(u))
         members = tuple(names[i] for i in order if abs(u[i]) > TAKES_PART)
-        words, gain = _best(added, total * both, u)
-        found.append(Weakness(members, float(max(eigenvalue[k], 1e-16) ** -0.5), words, gain))
+        remedy, gain = _best(added, total * both, u)
+        found.append(Weakness(members, float(max(eigenvalue[k], 1e-16) ** -0.5), remedy, gain))
     return tuple(found)
 
 
@@ -117,11 +117,11 @@ def _best(added: dict[str, FloatArray], scaled: FloatArray, u: FloatArray) -> tu
         held = information + 1e-14 * np.eye(len(u))
         return float(np.sqrt(max(float(u @ np.linalg.solve(held, u)), _ROUNDING)))
 
-    gains = {words: sigma(scaled) / sigma(scaled + more) for words, more in added.items()}
-    words = max(gains, key=lambda w: gains[w])
-    if gains[words] < _HELPS:
-        return "none of those tried helps much", gains[words]
-    return words, gains[words]
+    gains = {remedy: sigma(scaled) / sigma(scaled + more) for remedy, more in added.items()}
+    remedy = max(gains, key=lambda w: gains[w])
+    if gains[remedy] < _HELPS:
+        return "none of those tried helps much", gains[remedy]
+    return remedy, gains[remedy]
 
 
 def _more_views(joint: JointFit, views: Views) -> tuple[tuple[str, Views], ...]:

@@ -166,8 +166,8 @@ _UNITS = {
 
 
 def _unit_of(key: str) -> str:
-    words = [word for word in key.lower().split("_") if not word.isdigit()]
-    return _UNITS.get(words[-1], "1") if len(words) > 1 else "1"
+    parts = [word for word in key.lower().split("_") if not word.isdigit()]
+    return _UNITS.get(parts[-1], "1") if len(parts) > 1 else "1"
 
 
 def _extra(key: str) -> Covariate:
@@ -199,9 +199,9 @@ def covariates_of(views: Views) -> tuple[Covariate, ...]:
     """
     labels = []
     for key, column in views.labels.items():
-        words, counts = np.unique(column[column != ""], return_counts=True)
-        few = [str(w) for w, c in zip(words, counts, strict=True) if c >= _FEWEST_OF_A_LABEL]
-        labels += [_label(key, word) for word in few if len(words) > 1]
+        parts, counts = np.unique(column[column != ""], return_counts=True)
+        few = [str(w) for w, c in zip(parts, counts, strict=True) if c >= _FEWEST_OF_A_LABEL]
+        labels += [_label(key, word) for word in few if len(parts) > 1]
     return (*COVARIATES, *DERIVED, *(_extra(key) for key in views.extra), *labels)
 
 

@@ -33,7 +33,7 @@ def board(
     as_json: JsonFlag = False,
 ) -> None:
     """Draw the calibration board at scale, with a ruler, and say how to check the print."""
-    from cell.storage.files.board_words import parse_board
+    from cell.storage.files.board_option import parse_board
     from cell.verbs.board import draw_board, how_to_check
 
     described = parse_board(board)

@@ -79,7 +79,7 @@ def export(
             distance_m=distance,
             solution=solution,
             image_size_px=None if image_size is None else _size(image_size),
-            frames=dict(_frame(words) for words in frame or ()),
+            frames=dict(_frame(given_text) for given_text in frame or ()),
             views=recording,
             refit=refit,
         )
@@ -113,15 +113,15 @@ def _write_folder(output: Path | None, files: Mapping[str, str]) -> None:
         write_atomically(output / name, text)
 
 
-def _frame(words: str) -> tuple[str, str]:
-    name, _, given = words.partition("=")
+def _frame(given_text: str) -> tuple[str, str]:
+    name, _, given = given_text.partition("=")
     if not given:
-        raise InputError(f"--frame {words}: must be FRAME=NAME, such as camera=wrist_camera")
+        raise InputError(f"--frame {given_text}: must be FRAME=NAME, such as camera=wrist_camera")
     return name.strip(), given.strip()
 
 
-def _size(words: str) -> tuple[int, int]:
-    found = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", words)
+def _size(given_text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", given_text)
     if found is None:
-        raise InputError(f"--image-size {words}: must be WIDTHxHEIGHT, such as 4096x3072")
+        raise InputError(f"--image-size {given_text}: must be WIDTHxHEIGHT, such as 4096x3072")
     return int(found[1]), int(found[2])

@@ -89,7 +89,7 @@ def import_(
     as_json: JsonFlag = False,
 ) -> None:
     """Turn images and poses of another tool's layout into a recording, corners found."""
-    from cell.storage.files.board_words import parse_board
+    from cell.storage.files.board_option import parse_board
     from cell.verbs.importing.conventions import StatedConvention
     from cell.verbs.importing.described import Described, OfBag
     from cell.verbs.importing.importer import import_source
@@ -120,5 +120,5 @@ def import_(
     show(text, vars(imported), as_json=as_json)
     if imported.contradicted:
         raise BadAnswer(
-            "\n".join(f"THE PICTURES SPEAK AGAINST IT: {words}" for words in imported.contradicted)
+            "\n".join(f"THE PICTURES SPEAK AGAINST IT: {note}" for note in imported.contradicted)
         )

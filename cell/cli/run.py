@@ -62,10 +62,10 @@ def run(
     read = read_plan(path)
     with shown_on_page(page, read, folder, dry_run=dry_run) as live:
 
-        def report_progress(words: str) -> None:
-            say(words)
+        def report_progress(text: str) -> None:
+            say(text)
             if live is not None:
-                live.say(words)
+                live.say(text)
 
         result = record(read, folder, dry_run=dry_run, resume=resume, peers=peers, live=live)
         outcome = Outcome.of(result, folder)
@@ -85,9 +85,9 @@ def run(
         say_error(result.reason)
     if not outcome.complete and result.finish is not Finish.BAD_INPUT:
         flags = {"--dry-run": dry_run, "--peers": peers, "--record-only": record_only}
-        words = ["cell", "run", str(path), "-o", str(folder), *(f for f in flags if flags[f])]
-        words += [] if page is None else ["--page", page]
-        say(f"when that is mended, go on with: {shlex.join(words)} --resume")
+        command = ["cell", "run", str(path), "-o", str(folder), *(f for f in flags if flags[f])]
+        command += [] if page is None else ["--page", page]
+        say(f"when that is mended, go on with: {shlex.join(command)} --resume")
     if outcome.undetermined is not None:
         say_error(outcome.undetermined)
     undetermined = EXIT_BAD_ANSWER if outcome.undetermined is not None else EXIT_DONE

@@ -47,6 +47,6 @@ def fault_in(packet: Packet) -> str | None:
             return f"{what}: {remedy}"
     mode = int(packet.number("robot_mode"))
     if mode != ROBOT_RUNNING:
-        words = _ROBOT_MODES.get(mode, f"is in mode {mode}")
-        return f"the arm {words}: power it on and release the brakes on the teach pendant"
+        state = _ROBOT_MODES.get(mode, f"is in mode {mode}")
+        return f"the arm {state}: power it on and release the brakes on the teach pendant"
     return None

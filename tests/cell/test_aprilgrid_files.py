@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from cell.cli.app import app
 from cell.errors import InputError
 from cell.storage.files.board_file import AprilGrid, Chessboard, board_file
-from cell.storage.files.board_words import parse_board
+from cell.storage.files.board_option import parse_board
 from cell.storage.files.kalibr_target import kalibr_target, read_kalibr_target
 
 KALIBR = """\

@@ -221,8 +221,8 @@ def _rivals(
         rest = project_out(projected, mine, np.flatnonzero(owner == other))
         left = max(float(typical**2 @ np.diag(rest)), 0.0)
         if left < DECISIVE:
-            words = experiment(effects[at].effect, present.effect)
-            found.append(Rival(present.effect.label, left, 1.0 - left / strength, words))
+            distinguishing = experiment(effects[at].effect, present.effect)
+            found.append(Rival(present.effect.label, left, 1.0 - left / strength, distinguishing))
     return tuple(sorted(found, key=lambda rival: rival.strength))
 
 

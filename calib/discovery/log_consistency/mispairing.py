@@ -97,12 +97,12 @@ def _shifted_run(views: Views, sources: Sources, miss: tuple[float, float]) -> M
         "to_frame": (float(frames[-1]), "frame"),
         "frames": (float(len(frames)), "frame"),
     }
-    words = _described(sources, {int(frame): k for k, frame in enumerate(views.frame)})
+    text = _described(sources, {int(frame): k for k, frame in enumerate(views.frame)})
     if twice:
-        words += "; " + ", ".join(f"pose {pose} was taken twice" for pose in twice)
+        text += "; " + ", ".join(f"pose {pose} was taken twice" for pose in twice)
     return Mixup(
         name="stale_pictures" if stale else "frame_pose_offset",
-        physics=f"Some pictures are of another frame's pose: {words}.",
+        physics=f"Some pictures are of another frame's pose: {text}.",
         remedy=_CHECK,
         mend=_mending(sources),
         parameters=parameters,

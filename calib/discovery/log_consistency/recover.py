@@ -40,8 +40,8 @@ def _poses_from_joints(views: Views, kinematics: ArmKinematics) -> tuple[Views, 
         return views, ()
     poses = views.base_from_flange.copy()
     poses[lacking] = kinematics.forward(views.joints_rad[lacking])
-    words = f"flange poses of {int(lacking.sum())} frames worked out from the joints"
-    return replace(views, base_from_flange=poses), (words,)
+    note = f"flange poses of {int(lacking.sum())} frames worked out from the joints"
+    return replace(views, base_from_flange=poses), (note,)
 
 
 def _joints_from_poses(views: Views, kinematics: ArmKinematics) -> tuple[Views, tuple[str, ...]]:
@@ -61,8 +61,8 @@ def _joints_from_poses(views: Views, kinematics: ArmKinematics) -> tuple[Views, 
         near = joints[i]
     if not np.isfinite(joints).any():
         return views, ()
-    words = "joints worked out from the flange poses, by the branch nearest to the frame before"
-    return replace(views, joints_rad=joints), (words,)
+    note = "joints worked out from the flange poses, by the branch nearest to the frame before"
+    return replace(views, joints_rad=joints), (note,)
 
 
 def _turns(difference: FloatArray) -> FloatArray:
@@ -81,5 +81,5 @@ def _approaches(views: Views) -> tuple[Views, tuple[str, ...]]:
             approach[i] = views.joints_rad[before]
     if not np.isfinite(approach).any():
         return views, ()
-    words = "where a move came from taken from the frame before"
-    return replace(views, approach_joints_rad=approach), (words,)
+    note = "where a move came from taken from the frame before"
+    return replace(views, approach_joints_rad=approach), (note,)

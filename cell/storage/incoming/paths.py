@@ -69,7 +69,7 @@ def plain_file(path: Path) -> bool:
 def check_plain(path: Path, mode: int) -> None:
     """Raise `InputError` where `mode`, of `os.stat`, is not that of an ordinary file."""
     if not stat.S_ISREG(mode):
-        kind = next((words for is_kind, words in _KINDS if is_kind(mode)), "something else")
+        kind = next((name for is_kind, name in _KINDS if is_kind(mode)), "something else")
         raise InputError(f"{path}: is {kind}, not an ordinary file; only those are read")
 
 

@@ -75,7 +75,7 @@ def sheet(board: Board, paper: str | None = None) -> VectorPage:
     page = _page((wide + 2 * quiet, high + 2 * quiet + _FOOT_MM), paper)
     left, top = (page[0] - wide) / 2, (page[1] - _FOOT_MM - high) / 2
     foot = (max(min(left, page[0] - _TEXT_WIDTH_MM - _MARGIN_MM), _MARGIN_MM), page[1] - _FOOT_MM)
-    words = (
+    lines = (
         "ruler: 100 mm. Print at 100 %, not fitted to the page.",
         description(board),
         "The corner nearest to the top left of the pattern is row 0, col 0.",
@@ -86,7 +86,7 @@ def sheet(board: Board, paper: str | None = None) -> VectorPage:
         height_mm=page[1],
         rectangles=tuple((left + x, top + y, w, h) for x, y, w, h in dark(board)),
         lines=_ruler(foot[0], foot[1] + 8.0),
-        texts=tuple((foot[0], foot[1] + 12.5 + 4.0 * k, text) for k, text in enumerate(words)),
+        texts=tuple((foot[0], foot[1] + 12.5 + 4.0 * k, text) for k, text in enumerate(lines)),
     )
 
 

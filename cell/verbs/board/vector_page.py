@@ -39,7 +39,7 @@ class VectorPage:
                        self.rectangles)  # fmt: skip
         ruled = "".join(f"M{x:.4f} {y:.4f}L{to_x:.4f} {to_y:.4f}" for x, y, to_x, to_y in
                         self.lines)  # fmt: skip
-        words = "".join(f'<text x="{x:.3f}" y="{y:.3f}">{escape(text)}</text>\n' for x, y, text in
+        labels = "".join(f'<text x="{x:.3f}" y="{y:.3f}">{escape(text)}</text>\n' for x, y, text in
                         self.texts)  # fmt: skip
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" width="{self.width_mm:.4f}mm"'
@@ -48,7 +48,7 @@ class VectorPage:
             f' font-size="{_TEXT_MM}">\n<title>{escape(self.title)}</title>\n'
             f'<rect width="100%" height="100%" fill="white"/>\n<path d="{path}"/>\n'
             f'<path d="{ruled}" stroke="black" stroke-width="{_LINE_MM}" fill="none"/>\n'
-            f"{words}</svg>\n"
+            f"{labels}</svg>\n"
         )
 
     def pdf(self) -> str:

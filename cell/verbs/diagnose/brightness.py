@@ -66,7 +66,7 @@ def brightness_notes(recording: Recording, found: Diagnosis) -> tuple[str, ...]:
     )
 
 
-def _trend(level: FloatArray, along: FloatArray, words: str) -> tuple[str, ...]:
+def _trend(level: FloatArray, along: FloatArray, suffix: str) -> tuple[str, ...]:
     """A sentence where the level follows something clearly, by more than two percent."""
     known = np.isfinite(level) & np.isfinite(along)
     x, y = along[known], level[known] / float(np.median(level[known]))
@@ -79,4 +79,4 @@ def _trend(level: FloatArray, along: FloatArray, words: str) -> tuple[str, ...]:
     change = slope * float(np.ptp(x))
     if abs(slope) < _CLEAR_SIGMA * sigma or abs(change) < _WORTH_REPORTING:
         return ()
-    return (f"the board's white changes by {change:+.0%} {words}",)
+    return (f"the board's white changes by {change:+.0%} {suffix}",)

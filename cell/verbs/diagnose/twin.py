@@ -104,8 +104,8 @@ def _views(views: Views) -> list[dict[str, Any]]:
             if np.isfinite(value):
                 view[name] = float(value)
         further = {k: float(v[i]) for k, v in views.extra.items() if np.isfinite(v[i])}
-        words = {k: str(v[i]) for k, v in views.labels.items() if v[i]}
-        if further or words:
-            view["log"] = {**further, **words}
+        labels = {k: str(v[i]) for k, v in views.labels.items() if v[i]}
+        if further or labels:
+            view["log"] = {**further, **labels}
         reported.append(view)
     return reported

@@ -86,8 +86,8 @@ def _flat(data: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _plain(name: str) -> str:
-    words = re.sub(r"[._/]+", " ", _SUFFIX.sub("", name.strip().lower()))
-    return re.sub(r"[^a-z0-9]", "", _AROUND.sub("", words))
+    name_only = re.sub(r"[._/]+", " ", _SUFFIX.sub("", name.strip().lower()))
+    return re.sub(r"[^a-z0-9]", "", _AROUND.sub("", name_only))
 
 
 def _of(plain: Mapping[str, float], kind: str, axes: str) -> list[float] | None:

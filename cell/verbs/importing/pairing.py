@@ -235,16 +235,16 @@ def apply(pairing: Pairing, matrices: FloatArray) -> FloatArray:
 
 
 def _nothing(pictures: Sequence[str], poses: Sequence[RawPose]) -> str:
-    words = f"{len(pictures)} pictures and {len(poses)} poses, and nothing tells which belong"
+    message = f"{len(pictures)} pictures and {len(poses)} poses, and nothing tells which belong"
     example = f"(such as {pictures[0]} and {poses[0].name or poses[0].number or poses[0].where})"
     timed = any(pose.time_s is not None or (pose.number or 0) > 1e8 for pose in poses)
     if timed:
         return (
-            f"{words} together {example}: no pose is near enough in time to any picture. Say"
+            f"{message} together {example}: no pose is near enough in time to any picture. Say"
             " --time-bound SECONDS if their clocks allow more, or name the pictures in the pose"
             " file"
         )
     return (
-        f"{words} together {example}. Remove the ones without a partner, or number both, or name"
+        f"{message} together {example}. Remove the ones without a partner, or number both, or name"
         " the picture of each pose in the pose file"
     )

@@ -27,13 +27,13 @@ def role_of(key: str) -> Role:
 
     Only the innermost key is asked first: `robot.joints` is of joints.
     """
-    for words in reversed([part for part in re.split(r"[.\[\]#]+", key.lower()) if part]):
-        if _OTHER.search(words):
+    for level in reversed([part for part in re.split(r"[.\[\]#]+", key.lower()) if part]):
+        if _OTHER.search(level):
             return "other"
-        if _JOINTS.search(words):
+        if _JOINTS.search(level):
             return "joints"
-        if _BOARD.search(words):
+        if _BOARD.search(level):
             return "board"
-        if _FLANGE.search(words):
+        if _FLANGE.search(level):
             return "flange"
     return "flange"

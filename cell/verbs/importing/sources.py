@@ -61,9 +61,9 @@ def common_size_px(pictures: Sequence[Path]) -> tuple[tuple[int, int], tuple[str
     (size, _), *others = sizes.most_common()
     if not others:
         return size, ()
-    words = ", ".join(f"{count} of {width}x{height}" for (width, height), count in others)
+    listed = ", ".join(f"{count} of {width}x{height}" for (width, height), count in others)
     return size, (
-        f"the camera's pictures have {size[0]}x{size[1]} pixels; {words} are left out:"
+        f"the camera's pictures have {size[0]}x{size[1]} pixels; {listed} are left out:"
         " another camera, binning or region, or scaled pictures",
     )
 

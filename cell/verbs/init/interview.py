@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from calib.mount import Mount
 from cell.errors import InputError
-from cell.storage.files.board_words import parse_board
+from cell.storage.files.board_option import parse_board
 from cell.verbs.init.answers import Answers, CameraDriver, Focus, RobotDriver
 
 Given = Mapping[str, Any]

@@ -114,14 +114,14 @@ def as_lines(found: PlanPower) -> list[str]:
     )
     missed = [e.effect.label for e in power.effects if not e.detected]
     pairs = [f"{first.effect.label} and {rival.label}" for first, rival in alike(power)]
-    words = f"effects it would reveal, at this share of their usual size: {reported}"
-    lines = fill(words, _WIDTH, subsequent_indent="  ").splitlines()
+    text = f"effects it would reveal, at this share of their usual size: {reported}"
+    lines = fill(text, _WIDTH, subsequent_indent="  ").splitlines()
     if missed:
         lines.append(f"missed at their usual size: {', '.join(missed)}")
     lines += [f"cannot be seen: {name} ({why})" for name, why in power.unseen.items()]
     if pairs:
-        words = f"could not be told apart: {'; '.join(pairs)}"
-        lines += fill(words, _WIDTH, subsequent_indent="  ").splitlines()
+        text = f"could not be told apart: {'; '.join(pairs)}"
+        lines += fill(text, _WIDTH, subsequent_indent="  ").splitlines()
     return [*lines, "sizes with their units: `cell plan --power` with the plan's name"]
 
 

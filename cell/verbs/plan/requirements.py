@@ -68,8 +68,8 @@ class Requirements:
             "--alpha-sigma-px": self.alpha_sigma_px,
             "--seed": self.seed,
         }
-        words = [f"{option} {value}" for option, value in given.items() if value is not None]
-        return [*words, *(["--by-hand"] if self.by_hand else [])]
+        arguments = [f"{option} {value}" for option, value in given.items() if value is not None]
+        return [*arguments, *(["--by-hand"] if self.by_hand else [])]
 
 
 def fewest(pool: CandidatePool, alpha_sigma_px: float, seed: int) -> PlanSize:

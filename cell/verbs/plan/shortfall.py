@@ -88,9 +88,9 @@ def why_not(cell: CellFile) -> str:
     met: Counter[str] = Counter()
     example = ""
     for camera_from_board in _sights(cell):
-        reason, words = _refusal(cell, guard, camera_from_board)
+        reason, refusal = _refusal(cell, guard, camera_from_board)
         met[reason] += 1
-        example = example or words
+        example = example or refusal
     free = met.pop("", 0)
     if not free + met.total():
         return (
@@ -122,15 +122,15 @@ def _refusal(cell: CellFile, guard: Guard, camera_from_board: RigidTransform) ->
     branches = usual_branches(pose, home, guard)
     if not len(branches):
         return "need shoulder, elbow or wrist turned far from home", ""
-    words = ""
+    refusal = ""
     for joints in branches:
         try:
             guard.check_move(home, joints, "the view")
         except SafetyError as refused:
-            words = words or str(refused)
+            refusal = refusal or str(refused)
         else:
             return "", ""
-    return "would meet a body, a limit or a box on the way from home", words
+    return "would meet a body, a limit or a box on the way from home", refusal
 
 
 def _seen_from_home(cell: CellFile, guard: Guard) -> str:

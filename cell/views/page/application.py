@@ -164,15 +164,15 @@ class Page:
         """Give the view up that the operator saw; a click that comes late skips no other one."""
         status, asked = self._live.status, request.query_params.get("view", "")
         if status is None or asked != str(status.index):
-            words = "The run is at another view by now; nothing was skipped."
-            return JSONResponse({"words": words}, 409)
+            text = "The run is at another view by now; nothing was skipped."
+            return JSONResponse({"words": text}, 409)
         self._live.requests.skip(int(asked))
         return self._answer(f"{status.view} is given up.")
 
-    def _answer(self, words: str) -> Response:
+    def _answer(self, text: str) -> Response:
         if self._live.over:
             return JSONResponse({"words": "The run is over; the arm was let go of."}, 409)
-        return JSONResponse({"words": words})
+        return JSONResponse({"words": text})
 
 
 def _event(name: str, content: object) -> str:

@@ -13,9 +13,9 @@ class Messages:
     def __init__(self) -> None:
         self._lines: tuple[dict[str, str], ...] = ()
 
-    def add(self, words: str) -> None:
+    def add(self, text: str) -> None:
         """One more line."""
-        line = {"at": time.strftime("%H:%M:%S"), "words": words}
+        line = {"at": time.strftime("%H:%M:%S"), "words": text}
         self._lines = (line, *self._lines[: _KEPT - 1])
 
     def lines(self) -> tuple[dict[str, str], ...]:

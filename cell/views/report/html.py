@@ -6,19 +6,19 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 
-def text(words: object) -> str:
-    """`words` as HTML text."""
-    return escape(str(words))
+def text(content: object) -> str:
+    """`content` as HTML text."""
+    return escape(str(content))
 
 
-def paragraph(words: str, css: str = "") -> str:
+def paragraph(content: str, css: str = "") -> str:
     """A paragraph of plain text."""
-    return f"<p{_class(css)}>{text(words)}</p>"
+    return f"<p{_class(css)}>{text(content)}</p>"
 
 
-def missing(words: str) -> str:
+def missing(content: str) -> str:
     """What is not shown, and why."""
-    return paragraph(words, "missing")
+    return paragraph(content, "missing")
 
 
 def bullets(items: Iterable[str]) -> str:

@@ -51,7 +51,7 @@ def render(data: ReportData) -> str:
     """The whole page as HTML text."""
     style = files("cell.views.report").joinpath("style.css").read_text(encoding="utf-8")
     title = html.text(data.recording.get("name") or "calibration")
-    links = "".join(f'<a href="#{anchor}">{html.text(words)}</a>' for anchor, words in _LINKS)
+    links = "".join(f'<a href="#{anchor}">{html.text(heading)}</a>' for anchor, heading in _LINKS)
     body = "\n".join(section(data) for section in _SECTIONS)
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'

@@ -91,8 +91,8 @@ def lacking(planned: Sights, seen: Sights) -> tuple[str, ...]:
         has, got = (s.between(low - slack, high + slack) for s in (planned, seen))
         if got < min(has, _OF_EACH):
             lacks.append(f"views at {low:.2f} to {high:.2f} m")
-    for axis, words in enumerate(_TILTS):
+    for axis, where in enumerate(_TILTS):
         has, got = (s.tilted(axis) for s in (planned, seen))
         if got < min(has, _OF_EACH):
-            lacks.append(f"views of the board {words}")
+            lacks.append(f"views of the board {where}")
     return tuple(lacks)

@@ -99,7 +99,7 @@ class RegisterMap:
 
     def _fill_bootstrap(self, address: str, model: str, serial: str, xml_bytes: int) -> None:
         ip = int(ipaddress.IPv4Address(address))
-        words = {
+        registers = {
             0x0000: 0x00020000,
             0x0004: 0x80000001,
             0x0008: 0x0200,
@@ -115,7 +115,7 @@ class RegisterMap:
             ft.TICK_FREQUENCY + 4: TICKS_PER_S,
             ft.STREAM_PACKET_SIZE: 1400,
         }
-        for at, value in words.items():
+        for at, value in registers.items():
             self.set_word(at, value)
         url = f"Local:camera.xml;{_XML_AT:X};{xml_bytes:X}"
         texts = {0x0048: "CalibrationCell", 0x0068: model, 0x0088: "1", 0x00D8: serial, 0x0200: url}

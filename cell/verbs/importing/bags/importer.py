@@ -159,18 +159,18 @@ def _offset(
     stated = described.bag.clock_offset_s
     found = _estimated(bag, contents, robot, board, order)
     if found is None:
-        words = "the pictures do not tell by how much the camera's clock is off from the joints'"
+        message = "the pictures do not tell by how much the camera's clock is off from the joints'"
     else:
         late = "late" if found.offset_s < 0 else "early"
-        words = (
+        message = (
             f"the camera's clock is {1e3 * abs(found.offset_s):.1f} ± {1e3 * found.sigma_s:.1f} ms"
             f" {late} against the joints'"
         )
     if stated is not None:
-        return stated, f"{words}; {1e3 * stated:.1f} ms are added as stated (--clock-offset)"
+        return stated, f"{message}; {1e3 * stated:.1f} ms are added as stated (--clock-offset)"
     if found is None or not found.sure:
-        return 0.0, f"{words}; nothing is added"
-    return found.offset_s, f"{words}; made good (--clock-offset 0 leaves it)"
+        return 0.0, f"{message}; nothing is added"
+    return found.offset_s, f"{message}; made good (--clock-offset 0 leaves it)"
 
 
 def _estimated(
@@ -286,12 +286,12 @@ def _held_against_pictures(found: Imported, robot: Robot, recording: Any) -> Imp
     closure = None if check is None else check(matrices)
     if closure is None:
         return replace(found, guessed=(*found.guessed, "too few pictures to check the poses by"))
-    words = (
+    message = (
         f"robot's and camera's turns agree to {np.degrees(closure.angle_rad):.2f} degrees, places"
         f" to {1e2 * closure.place_share:.1f} % of the way"
     )
     if closure.angle_rad <= _GOOD_RAD and closure.place_share <= _GOOD_SHARE:
-        stated = f"the pictures bear the poses out: {words}"
+        stated = f"the pictures bear the poses out: {message}"
         return replace(found, guessed=(*found.guessed, stated))
-    against = f"the poses taken agree with the pictures only so: {words}. Check --base, --flange,"
+    against = f"the poses taken agree with the pictures only so: {message}. Check --base, --flange,"
     return replace(found, contradicted=(f"{against} --mount and --clock-offset",))

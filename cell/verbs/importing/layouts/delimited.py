@@ -72,8 +72,8 @@ def _separator(body: str) -> tuple[str, bool]:
         if separator in unquoted:
             cells = [cell.strip() for cell in re.split(f"[{separator}\n]", unquoted)]
             return separator, any(_COMMA.fullmatch(cell) for cell in cells)
-    words = unquoted.split()
-    if sum(bool(_COMMA.fullmatch(word)) for word in words) > len(words) / 2:
+    parts = unquoted.split()
+    if sum(bool(_COMMA.fullmatch(word)) for word in parts) > len(parts) / 2:
         return " ", True
     return ("," if "," in unquoted else " "), False
 
@@ -227,8 +227,8 @@ def _keys(
     what = [n for n, c in (("an index", index), ("a time", time)) if c is not None]
     if not columns.size:
         return None, None, ()
-    words = " and ".join(what) or "numbers that are no pose's"
-    return index, time, (f"rows are {words}, then a pose of {width} numbers",)
+    layout = " and ".join(what) or "numbers that are no pose's"
+    return index, time, (f"rows are {layout}, then a pose of {width} numbers",)
 
 
 def _matrices_over_lines(path: Path, rows: Sequence[tuple[int, list[str]]]) -> list[RawPose]:

@@ -20,10 +20,10 @@ _FRAME = re.compile(
 def read(path: Path, text: str) -> list[Series]:
     """The frames in their order: millimetres, degrees about moving z, y, x."""
     poses = []
-    for line, words in enumerate(text.splitlines(), 1):
-        if words.lstrip().startswith(";"):
+    for line, content in enumerate(text.splitlines(), 1):
+        if content.lstrip().startswith(";"):
             continue
-        for found in _FRAME.finditer(words):
+        for found in _FRAME.finditer(content):
             values = np.array([float(number) for number in found.groups()[1:]])
             poses.append(
                 RawPose(f"{path}:{line}", None, values, ("euler_zyx_deg",), "mm", name=found[1])

@@ -20,8 +20,8 @@ _TARGET = re.compile(
 def read(path: Path, text: str) -> list[Series]:
     """The program's targets in its order: millimetres, scalar first."""
     poses = []
-    for line, words in enumerate(text.splitlines(), 1):
-        for found in _TARGET.finditer(words.partition("!")[0]):
+    for line, content in enumerate(text.splitlines(), 1):
+        for found in _TARGET.finditer(content.partition("!")[0]):
             values = np.array([float(number) for number in found.groups()[1:]])
             poses.append(
                 RawPose(f"{path}:{line}", None, values, ("quat_wxyz",), "mm", name=found[1])

@@ -34,8 +34,8 @@ def _found(path: Path, text: str, pattern: re.Pattern[str], key: str, role: Role
             "m" if role == "flange" else None,
             name=found[1],
         )
-        for line, words in enumerate(text.splitlines(), 1)
-        for found in pattern.finditer(words.partition("#")[0])
+        for line, content in enumerate(text.splitlines(), 1)
+        for found in pattern.finditer(content.partition("#")[0])
     ]
     notes = ("a UR pose is the tool's: it is the flange's where the TCP was set to zero",)
     return Series("URScript", key, role, tuple(poses), notes if role == "flange" else ())

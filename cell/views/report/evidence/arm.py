@@ -61,11 +61,11 @@ def error_against_approach(data: ReportData, effect: Mapping[str, Any]) -> Figur
     figure, axes = panels(9.2, 2.8, columns=len(shown), sharey=True)
     axis = int(np.argmax(np.nanstd(shifts[0], axis=0)))
     for ax, (name, shift) in zip(axes, shown, strict=True):
-        for sign, marker, colour, words in ((1, "^", ORANGE, "below"), (-1, "v", BLUE, "above")):
+        for sign, marker, colour, side in ((1, "^", ORANGE, "below"), (-1, "v", BLUE, "above")):
             chosen = came[:, joint] == sign
             ax.plot(np.degrees(views.joints_rad[chosen, joint]), shift[chosen, axis] * 1e3,
                     marker=marker, linestyle="", color=colour, fillstyle="none",
-                    label=f"joint came from {words}")  # fmt: skip
+                    label=f"joint came from {side}")  # fmt: skip
         ax.set(title=name, xlabel=f"joint {joint + 1} (°)")
     axes[0].set(ylabel=f"{_AXES[axis]} error (mm)")
     legend_below(figure, axes)

@@ -49,10 +49,10 @@ def by_focus_direction(data: ReportData, effect: Mapping[str, Any]) -> Figure | 
     shown = [(n, s) for n, s in zip(names, shifts, strict=True) if s is not None]
     figure, axes = panels(9.2, 3.2, columns=len(shown), sharey=True)
     for ax, (name, shift) in zip(axes, shown, strict=True):
-        for sign, marker, colour, words in ((1, "^", ORANGE, "rising"), (-1, "v", BLUE, "falling")):
+        for sign, marker, colour, way in ((1, "^", ORANGE, "rising"), (-1, "v", BLUE, "falling")):
             chosen = np.sign(came) == sign
             ax.plot(distance[chosen], shift[chosen, 2] * 1e3, marker=marker, linestyle="",
-                    color=colour, fillstyle="none", label=f"focus {words}")  # fmt: skip
+                    color=colour, fillstyle="none", label=f"focus {way}")  # fmt: skip
         ax.set(title=name, xlabel="distance (m)")
     axes[0].set(ylabel="depth error (mm)")
     legend_below(figure, axes)

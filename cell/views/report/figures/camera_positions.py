@@ -40,8 +40,8 @@ def _solution(ax: Axes, data: ReportData, name: str, axis: int) -> None:
     poses = data.poses[name]
     at = _plane_mm(poses.board_from_camera, axis)
     look = {**style(name), "linestyle": ""}
-    words = solution_name(name)
-    ax.plot(*at.T, label=words, fillstyle="none", zorder=3, **look)
+    label = solution_name(name)
+    ax.plot(*at.T, label=label, fillstyle="none", zorder=3, **look)
     true, whose = reference(data, poses)
     if true is None:
         return

@@ -43,5 +43,5 @@ def draw_holdout(data: ReportData) -> Figure | None:
 
 def _name(row: dict[str, Any]) -> str:
     parts = [row.get("site"), row["covariate"], row.get("where")]
-    words = ", ".join(str(part) for part in parts if part)
-    return f"{row['link']}: {words.replace('_', ' ')}"
+    text = ", ".join(str(part) for part in parts if part)
+    return f"{row['link']}: {text.replace('_', ' ')}"

@@ -77,8 +77,8 @@ def _zones(ax: Axes, data: ReportData, letter: str, distance: FloatArray) -> Non
         ax.plot([near, far], [mean, mean], color=BLACK, label="mean of zone 2")
 
 
-def _zone_name(ax: Axes, x: float, words: str) -> None:
-    ax.annotate(words, x, np.inf, up=-10, anchor="middle", color="#5b616b")
+def _zone_name(ax: Axes, x: float, label: str) -> None:
+    ax.annotate(label, x, np.inf, up=-10, anchor="middle", color="#5b616b")
 
 
 def _law(ax: Axes, data: ReportData, letter: str, distance: FloatArray) -> None:
@@ -90,8 +90,8 @@ def _law(ax: Axes, data: ReportData, letter: str, distance: FloatArray) -> None:
     grid = np.linspace(np.nanmin(distance), np.nanmax(distance), 120)
     curve = law_px(law, grid)
     if curve is not None:
-        words = str(law["law"]).replace("_", " ")
-        ax.plot(grid, curve, color=GREEN, linestyle="-.", label=f"fitted law: {words}")
+        label = str(law["law"]).replace("_", " ")
+        ax.plot(grid, curve, color=GREEN, linestyle="-.", label=f"fitted law: {label}")
 
 
 def _moving(ax: Axes, data: ReportData, letter: str) -> None:

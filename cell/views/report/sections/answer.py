@@ -82,8 +82,8 @@ def _banner(data: ReportData) -> str:
         return ""
     effects = ", ".join(data.truth.effects) if data.truth else ""
     more = f" Physics put in: {effects}." if effects else ""
-    words = f"no real camera or arm was involved.{more}"
-    return f'<p class="simulated"><strong>SIMULATED</strong> — {html.text(words)}</p>'
+    message = f"no real camera or arm was involved.{more}"
+    return f'<p class="simulated"><strong>SIMULATED</strong> — {html.text(message)}</p>'
 
 
 def _title(data: ReportData) -> str:
@@ -168,8 +168,8 @@ def _reprojection_card(data: ReportData) -> str:
     rms = data.solutions.get(name or "", {}).get("reprojection_px", {}).get("rms")
     note = f"RMS, {solution_name(name)}" if name else "no calibration"
     text = number(rms, "px", 2) if known(rms) else UNKNOWN
-    words = f"{note}; poses free, so it says nothing about the error in mm"
-    return html.card("Reprojection", text, words)
+    message = f"{note}; poses free, so it says nothing about the error in mm"
+    return html.card("Reprojection", text, message)
 
 
 def _by_distance(data: ReportData, best: WorkpieceError | None) -> str:

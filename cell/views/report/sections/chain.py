@@ -28,11 +28,11 @@ def chain(data: ReportData) -> str:
 
 
 def _box(data: ReportData, link: str, role: str) -> str:
-    css, mark, words = _state(data, link)
+    css, mark, message = _state(data, link)
     return (
         f'<li class="{css}"><strong>{html.text(link)}</strong>'
         f'<span class="role">{html.text(role)}</span>'
-        f"<span>{mark} {html.text(words)}</span></li>"
+        f"<span>{mark} {html.text(message)}</span></li>"
     )
 
 

@@ -20,9 +20,9 @@ def coverage(data: ReportData) -> str:
         "(rings at 10, 20, 30, 45, 60 degrees).",
         "No corner was found in any frame.",
     )
-    words = (
+    message = (
         f"{int(data.views.seen.sum())} corners in {int(data.views.seen.any(axis=1).sum())} frames; "
         f"{share:.0f} % of the image's 8 × 6 cells were seen. Where none was, the calibration "
         "extrapolates."
     )
-    return html.section("coverage", "Coverage: what the frames saw", shown, html.paragraph(words))
+    return html.section("coverage", "Coverage: what the frames saw", shown, html.paragraph(message))

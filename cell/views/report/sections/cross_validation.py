@@ -71,9 +71,9 @@ def _held_out(held: Mapping[str, Any]) -> str:
     rows = [
         ("distance from the logged pose's prediction, RMS", number(held["rms_px"], "px"),
          number(held["expected_px"], "px"), f"{number(low, '')} to {number(high, 'px')}"),
-        *((words, number(held[key]["per_freedom"]), "1",
+        *((label, number(held[key]["per_freedom"]), "1",
            " to ".join(number(edge) for edge in held[key]["band"]))
-          for key, words in (("robot", "robot's poses, χ² per degree of freedom"),
+          for key, label in (("robot", "robot's poses, χ² per degree of freedom"),
                              ("picture", "pictures alone, χ² per degree of freedom"))),
     ]  # fmt: skip
     head = ("frames held out", "found", "expected", "99 of 100 within")

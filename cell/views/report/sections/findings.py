@@ -26,8 +26,8 @@ from cell.views.report.sections.drawing import drawing
 def diagnosis_section(data: ReportData) -> str:
     """The whole diagnosis, or that there was none."""
     if data.diagnosis is None:
-        words = "No diagnosis was made: “cell diagnose” makes one from this recording."
-        return html.section("diagnosis", "Diagnosis", html.missing(words))
+        message = "No diagnosis was made: “cell diagnose” makes one from this recording."
+        return html.section("diagnosis", "Diagnosis", html.missing(message))
     verdict, meaning, _ = verdict_text(data)
     return html.section(
         "diagnosis",
@@ -146,12 +146,12 @@ def _without_a_name(data: ReportData, left: Mapping[str, Any]) -> str:
     """A sentence, what to look at on the machine, the law with its numbers, and its picture."""
     place = f", {left['where']}" if left.get("where") else ""
     site, along = (str(left[key]).replace("_", " ") for key in ("site", "covariate"))
-    words = (
+    message = (
         f"The {site} follows {along}{place} "
         f"(p {probability(left.get('p_value'))}), and no known effect accounts for it. "
         f"Look at {_LOOK_AT.get(left['link'], left['link'])}, and at what changes with {along}."
     )
-    return html.paragraph(words, "bad-note") + _law(left.get("law")) + _law_picture(data, left)
+    return html.paragraph(message, "bad-note") + _law(left.get("law")) + _law_picture(data, left)
 
 
 def _law_picture(data: ReportData, left: Mapping[str, Any]) -> str:

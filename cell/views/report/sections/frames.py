@@ -27,19 +27,19 @@ def frames(data: ReportData) -> str:
     }
     numbers = sorted({int(f) for f in data.views.frame} | set(rejected))
     shown = _thinned(numbers, rejected)
-    words = f"{len(numbers) - len(rejected)} frames used, {len(rejected)} rejected."
+    message = f"{len(numbers) - len(rejected)} frames used, {len(rejected)} rejected."
     if len(shown) < len(numbers):
-        words += f" {len(shown)} of {len(numbers)} are shown; every rejected one is."
+        message += f" {len(shown)} of {len(numbers)} are shown; every rejected one is."
     if data.thumbnail is None:
-        words += " Pictures were not kept: only the corners are drawn."
-    words += _wrong_corners((data.calibration or {}).get("corners_left_out") or [])
+        message += " Pictures were not kept: only the corners are drawn."
+    message += _wrong_corners((data.calibration or {}).get("corners_left_out") or [])
     # reading and shrinking pictures is most of a report's time, and both leave the interpreter free
     with ThreadPoolExecutor(max_workers=_READERS) as readers:
         grid = "".join(readers.map(lambda f: _frame(data, f, rejected.get(f)), shown))
     return html.section(
         "frames",
         "Every frame",
-        html.paragraph(words),
+        html.paragraph(message),
         _reasons(rejected),
         _skipped(data.skipped),
         f'<div class="thumbs">{grid}</div>',

@@ -84,8 +84,8 @@ def _difference(law: Mapping[str, Any], best: float | None) -> str:
     return UNKNOWN if best is None or not known(aicc) else f"{aicc - best:.1f}"
 
 
-def _sentence(words: object) -> str:
-    text = _spaced(words or "").rstrip(".")
+def _sentence(content: object) -> str:
+    text = _spaced(content or "").rstrip(".")
     return f"{text[0].upper()}{text[1:]}." if text else ""
 
 

@@ -52,9 +52,9 @@ def not_logged(data: ReportData) -> Iterator[str]:
             "The joints each move came from were not logged: backlash stays hidden.",
         ),
     )
-    for column, words in columns:
+    for column, message in columns:
         if not np.isfinite(column).any():
-            yield words
+            yield message
 
 
 def _scale(data: ReportData) -> Iterator[str]:

@@ -80,13 +80,13 @@ def _noise(data: ReportData) -> str:
     if not robot.get("source"):
         return ""
     outliers = ", ".join(str(frame) for frame in robot.get("outliers") or []) or "none"
-    words = (
+    message = (
         f"Noise the joint fit estimated: flange {millimetres(robot.get('flange_sigma_m'))} and "
         f"{number(_degrees(robot.get('flange_sigma_rad')), '°', 2)} per axis, corners "
         f"{number(robot.get('corner_sigma_px'), 'px', 2)}. Frames whose logged pose disagrees with "
         f"their picture: {outliers}."
     )
-    return html.paragraph(words)
+    return html.paragraph(message)
 
 
 def _thousandths(value: float | None) -> float | None:

@@ -19,13 +19,13 @@ def transforms_section(data: ReportData) -> str:
     except InputError:
         return ""  # the warnings above say why there is none
     blocks = "".join(_block(placement) for placement in found)
-    words = (
+    message = (
         "Click a box to select it whole. Further formats, and your own names of the frames: "
         "cell export --format tf, urdf, ur, abb, moveit, easy_handeye2 or text."
     )
     return html.fold(
         "Take away: the camera's place for ROS, URDF, UR and ABB",
-        blocks + html.paragraph(words, "small"),
+        blocks + html.paragraph(message, "small"),
     )
 
 

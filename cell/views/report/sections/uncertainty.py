@@ -38,10 +38,10 @@ def uncertainty_sentences(data: ReportData) -> Iterator[str]:
             f"{number(found['distance_m'][-1], 'm')} (one sigma, image's mean)."
         )
     for weak in calibration.get("not_separable") or ():
-        words = f"These views hardly tell apart {listed(quantity_names(weak['quantities']))}"
+        message = f"These views hardly tell apart {listed(quantity_names(weak['quantities']))}"
         more = weak["separate_with"]
         helps = f"; {more}." if more.startswith("none") else f": record {more} as well."
-        yield words + helps
+        yield message + helps
 
 
 _FRAMES = {
@@ -84,13 +84,13 @@ def _uncertainty_map(found: Mapping[str, Any] | None) -> str:
          *(number(1e3 * value, "", 2) for value in _axes(m)))
         for d, px, m in zip(found["distance_m"], pixels, metres, strict=True)
     ]  # fmt: skip
-    words = (
+    message = (
         "One sigma, from the full covariance of lens, focus law and the camera's place on the "
         "robot. Pixels: where a thing appears that the robot has the place of. Millimetres: where "
         "the robot is told a part is that one picture located, without that picture's own corner "
         "noise and the robot's repeatability. What the model leaves out is not in them."
     )
-    return html.table(head, rows) + html.paragraph(words, "small") + _map(found, metres)
+    return html.table(head, rows) + html.paragraph(message, "small") + _map(found, metres)
 
 
 def _axes(sigma_m: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, float, float]:

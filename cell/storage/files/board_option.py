@@ -1,4 +1,4 @@
-"""A board as it is said on the command line."""
+"""A board as the command line's option `--board` gives it."""
 
 from __future__ import annotations
 
