@@ -193,7 +193,7 @@ def main() -> None:
             "word, worst",
             "exit",
         ),
-        DISTURBANCES,
+        lambda _: DISTURBANCES,
         partial(slow_stand, joint_speed_deg_s=_SPEED_DEG_S),
         _judged,
         _row,

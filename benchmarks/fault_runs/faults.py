@@ -15,10 +15,12 @@ from benchmarks.fault_runs.launch import Launch
 from benchmarks.fault_runs.stands import Stand
 
 Act = Callable[[Stand, Launch], None]
-_DEVICE, _OPERATOR, _SAFETY, _KILLED = 3, 4, 5, -signal.SIGKILL
+DEVICE, _OPERATOR, SAFETY, _KILLED = 3, 4, 5, -signal.SIGKILL
 RESUMES = r"--resume"
 _NOBODY_KNOWS = ("NOBODY KNOWS WHETHER THE ARM STANDS", "PRESS THE EMERGENCY STOP", RESUMES)
 """Without a reading there is no word of the stop."""
+NOT_REACHED = ("[Cc]heck|try again", "No motion was ordered", RESUMES)
+"""Of a link that never was up."""
 _CONNECTING_S, _MOVING_S = 0.8, 4.2
 
 
@@ -56,7 +58,7 @@ class Fault:
 
     name: str
     happen: Act
-    exits: tuple[int, ...] = (_DEVICE,)
+    exits: tuple[int, ...] = (DEVICE,)
     patterns: tuple[str, ...] = ()
     halt_s: float | None = None
     survived: bool = False
@@ -127,7 +129,7 @@ _OWN = (
     Fault("SIGTERM", _sends(signal.SIGTERM), (_OPERATOR,), ("stopped by SIGTERM", RESUMES), 0.6),
     Fault("terminal closed", _sends(signal.SIGHUP), (_OPERATOR,), ("SIGHUP", RESUMES), 0.6),
     Fault("kill -9", _sends(signal.SIGKILL), (_KILLED,), (), 0.8),
-    Fault("disk full", _fill_disk, (_DEVICE,), ("disk", "[Ff]ree", RESUMES)),
+    Fault("disk full", _fill_disk, (DEVICE,), ("disk", "[Ff]ree", RESUMES)),
 )
 
 
@@ -175,7 +177,7 @@ _EMERGENCY_STOP = Fault(
 _CONTROLLER_DIES = Fault(
     "controller dies",
     lambda stand, _: stand.arm.kill(),
-    exits=(_SAFETY,),
+    exits=(SAFETY,),
     patterns=_NOBODY_KNOWS,
     halt_s=0.6,
     restore=_revive_arm,
@@ -209,7 +211,7 @@ _UR = (
     Fault(
         "controller mute",
         _mute,
-        exits=(_SAFETY,),
+        exits=(SAFETY,),
         patterns=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
         halt_s=1.0,
         restore=_restore_arm,
@@ -217,7 +219,7 @@ _UR = (
     Fault(
         "cable cut",
         lambda stand, _: stand.arm.cut(),
-        exits=(_SAFETY,),
+        exits=(SAFETY,),
         patterns=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
         halt_s=1.0,
         restore=_restore_arm,
@@ -340,7 +342,7 @@ _ABB = (
     Fault(
         "cable cut",
         lambda stand, _: stand.arm.cut(),
-        exits=(_SAFETY,),
+        exits=(SAFETY,),
         patterns=_NOBODY_KNOWS,
         halt_s=1.5,
         restore=_restore_arm,

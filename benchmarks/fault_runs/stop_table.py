@@ -1,4 +1,4 @@
-"""The tables of stops and of disturbances: so many trials of every kind, on every stand."""
+"""The tables of stops, disturbances and faults: so many trials of a kind, on every stand."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class Named(Protocol):
     def name(self) -> str: ...
 
 
-class Trial(Protocol):
+class Ran(Protocol):
     """What came of one run, with what it printed."""
 
     output: str
 
 
 K = TypeVar("K", bound=Named)
-T = TypeVar("T", bound=Trial)
+T = TypeVar("T", bound=Ran)
 Judged = list[tuple[T, list[str]]]
 """Trials, each with what was not as it must be."""
 
@@ -35,7 +35,7 @@ Judged = list[tuple[T, list[str]]]
 def print_table(
     description: str,
     columns: Sequence[str],
-    kinds: Sequence[K],
+    kinds_of: Callable[[str], Sequence[K]],
     stand_of: Callable[[str, Path], AbstractContextManager[Stand]],
     judged: Callable[[Stand, Path, str, K, int, int], Judged[T]],
     row: Callable[[str, K, Judged[T]], list[str]],
@@ -46,10 +46,13 @@ def print_table(
     ----------
     description:
         Of the command; its options are the same for all tables.
+    kinds_of:
+        What is tried on a stand, by its name.
     stand_of:
         Sets a stand up by its name, in a folder.
     judged:
-        Makes so many trials of a kind with a seed: fewer where the machine is too busy.
+        Makes so many trials of a kind with a seed: fewer where the machine is too busy, which is
+        not as it must be either.
     row:
         Their cells, one a column.
     """
@@ -65,7 +68,7 @@ def print_table(
         if asked.stand not in (None, name):
             continue
         with tempfile.TemporaryDirectory() as folder, stand_of(name, Path(folder)) as stand:
-            for kind in (kind for kind in kinds if asked.only in kind.name):
+            for kind in (kind for kind in kinds_of(name) if asked.only in kind.name):
                 found = judged(stand, Path(folder), name, kind, asked.instants, asked.seed)
                 print(_line(row(name, kind, found)), flush=True)
                 for trial, complaints in found:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.fault_runs.faults import Fault
+from benchmarks.fault_runs.faults import DEVICE, NOT_REACHED, SAFETY, Fault
 from benchmarks.fault_runs.launch import Launch
 from benchmarks.fault_runs.stands import Stand
 from calib.detection import Detection, detect
@@ -45,8 +45,8 @@ class Trial:
 
     Attributes
     ----------
-    moving:
-        Whether the arm moved when it happened.
+    moving, moved:
+        Whether the arm moved when it happened, and whether the run had moved it by then.
     halted_s:
         How long the arm moved on after it.
     exit_status:
@@ -60,6 +60,7 @@ class Trial:
     """
 
     moving: bool
+    moved: bool
     halted_s: float = 0.0
     exit_status: int | None = None
     frames: int = 0
@@ -97,10 +98,12 @@ def trial(stand: Stand, folder: Path, fault: Fault, instant_s: float) -> Trial:
         The run had ended by then, or ended for another reason.
     """
     before = _lines(folder)
+    began_rad = stand.sim.truth().joints_rad
     launch = Launch(stand.plan.path, folder)
     try:
         _await(launch, stand, fault, instant_s)
-        came = Trial(stand.truly_moving())
+        moved = not np.array_equal(stand.sim.truth().joints_rad, began_rad)
+        came = Trial(stand.truly_moving(), moved)
         _watch(stand, folder, fault, launch, came)
     finally:
         launch.finish()
@@ -166,15 +169,18 @@ def _interrupt_if_it_goes_on(launch: Launch, folder: Path, frames: int, since_s:
 
 
 def _judge(fault: Fault, came: Trial) -> None:
-    exits = (4,) if fault.survived else fault.exits
+    exits, patterns = (4,) if fault.survived else fault.exits, fault.patterns
+    if exits == (SAFETY,) and not came.moved and came.exit_status == DEVICE:
+        # the link was not up yet: nothing had been ordered, so that there was no stop to confirm
+        exits, patterns = (DEVICE,), NOT_REACHED
     came.demand(came.exit_status in exits, f"exit status {came.exit_status}, not {exits}")
     came.demand("Traceback" not in came.output, "a traceback")
     if fault.halt_s is not None:
         late = f"the arm moved on for {came.halted_s:.2f} s, allowed are {fault.halt_s:g} s"
         came.demand(came.halted_s <= fault.halt_s, late)
     last = "\n".join(came.output.splitlines()[-4:])
-    for patterns in fault.patterns:
-        came.demand(re.search(patterns, last) is not None, f"the operator is not told '{patterns}'")
+    for pattern in patterns:
+        came.demand(re.search(pattern, last) is not None, f"the operator is not told '{pattern}'")
 
 
 def _judge_recording(stand: Stand, folder: Path, before: list[bytes], came: Trial) -> None:

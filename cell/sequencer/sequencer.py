@@ -7,6 +7,7 @@ is stopped before anything else happens.
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, wait
@@ -133,11 +134,12 @@ class Sequencer:
             self._take_views()
         except BaseException as fault:
             error = fault
-        error = self._stop_arm(error)
+        last_s = time.monotonic() + _LAST_FRAME_S
+        error = self._stop_arm(error, last_s)
         if error is not None:
             self._notify(State.STOPPING)
             with suppress(DiskFailed):
-                self._keep_the_frame_in_hand()
+                self._keep_the_frame_in_hand(last_s)
         self._let_go()
         finish = finish_of(error, len(self._progress.skipped))
         reason = str(error or "") or (type(error).__name__ if error else "")
@@ -155,14 +157,34 @@ class Sequencer:
             "" if error else self._ended_early,
         )
 
-    def _stop_arm(self, fault: BaseException | None) -> BaseException | None:
-        """Stop the arm, at a fault or at the end; returns what the operator is told first."""
+    def _stop_arm(self, fault: BaseException | None, last_s: float) -> BaseException | None:
+        """Stop the arm, at a fault or at the end; returns what the operator is told first.
+
+        Until `time.monotonic` is `last_s` it is watched while a frame is in hand.
+        """
         error, word = self._arm.stop(fault)
         if word is not None:
             self._note("halt", **vars(word))
             if fault is not None and word.stands:
                 self._notify(State.STOPPING, word.text)
+            if word.stands:
+                return self._stand_by(error, last_s)
         return error
+
+    def _stand_by(self, error: BaseException | None, last_s: float) -> BaseException | None:
+        """Watch the arm while the frame in hand is checked; returns what is told first then."""
+        job = self._checking[1] if self._checking else None
+
+        def busy() -> bool:
+            if job is not None:
+                wait([job], timeout=POLL_S)
+            return job is not None and not job.done() and time.monotonic() < last_s
+
+        moved = self._arm.stand_by(busy)
+        if moved is None:
+            return error
+        self._note("moved again", **vars(moved[1]))
+        return moved[0]
 
     # -- one view after the other ------------------------------------------------------------
 
@@ -383,12 +405,12 @@ class Sequencer:
         self._journal.write("skip", view=index, reason=reason)
         self._notify(self._state, f"{self._plan.view_name(index)} skipped: {reason}")
 
-    def _keep_the_frame_in_hand(self) -> None:
+    def _keep_the_frame_in_hand(self, last_s: float) -> None:
         """A whole frame that is being checked as the run ends is logged if it is good."""
         if self._checking is None:
             return
         shot, job = self._checking
-        wait([job], timeout=_LAST_FRAME_S)
+        wait([job], timeout=max(0.0, last_s - time.monotonic()))
         if job.done() and job.exception() is None and job.result().fault is None:
             self._count(shot.index, job.result())
 

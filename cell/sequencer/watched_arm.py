@@ -17,18 +17,25 @@ from cell.sequencer.as_configured import check_as_configured
 from cell.sequencer.clock import Clock
 from cell.sequencer.confirmed_stop import ConfirmedStop, StopReport
 from cell.sequencer.guard import Guard
-from cell.sequencer.reading_watch import ARRIVING_RAD, ReadingWatch
+from cell.sequencer.reading_watch import ARRIVING_RAD, STANDING_RAD, ReadingWatch
 from cell.sequencer.rest import fastest_rad_s
 from cell.sequencer.same_arm import check_same_arm
 from cell.sequencer.stop import StopRequest
 from cell.storage.files.plan_file import Settle
 from drivers.arm import Arm, ArmState, Motion
-from drivers.errors import ArmStopped, DeviceError, StopFailed
+from drivers.errors import ArmStopped, DeviceError, SafetyError, StopFailed
 
 POLL_S = 0.008
 READING_PATIENCE_S = 1.0
 _MOVE_PATIENCE = 3.0
 _MOVE_SLACK_S = 15.0
+_NOT_REACHED = "No motion was ordered; should the arm move, it is not by this program."
+_MOVED_AGAIN = (
+    "The arm moved again after it had been stopped and had stood. Look what moves it: a program"
+    " that was gone on with at its pendant, another program, a person."
+)
+STAND_BY_S = 1.0
+"""A stop that was confirmed is watched for so long, before the arm is let go."""
 _UNDERWAY_RAD_S, _SURE_SHARE = 0.02, 0.3
 
 Result = TypeVar("Result")
@@ -69,7 +76,10 @@ class WatchedArm:
 
         Raises `SafetyError` where it is not the arm that the guard knows, or is set otherwise.
         """
-        self.arm.connect()
+        try:
+            self.arm.connect()
+        except DeviceError as fault:
+            raise type(fault)(f"{str(fault).rstrip('.')}. {_NOT_REACHED}") from None
         self.connected = True
         state = self.watch()
         check_same_arm(self.guard.kinematics, state)
@@ -223,11 +233,38 @@ class WatchedArm:
         word = self.halt(undisturbed=isinstance(fault, StoppedByOperator))
         if word.stands:
             return fault, word
-        with suppress(OSError):  # a terminal that is gone must not hide the rest
-            sys.stderr.write(f"\a\n*** {word.text} ***\n")
-            sys.stderr.flush()
         because = "the run was over" if fault is None else str(fault) or type(fault).__name__
-        return StopFailed(f"{word.text} It was to be stopped because: {because}"), word
+        return _shouted(word, f"It was to be stopped because: {because}"), word
+
+    def stand_by(self, busy: Callable[[], bool]) -> tuple[SafetyError, StopReport] | None:
+        """Watch an arm that was stopped, for `STAND_BY_S` and as long as something is `busy`.
+
+        Returns
+        -------
+        What the operator must be told of one that moved again, and the word of the stop that it
+        was then given; None where it stood, or nothing can be read any more.
+        """
+        until_s = self.clock.now() + STAND_BY_S
+        with suppress(Exception):  # as long as it can be read
+            stood = joints_of(self.arm.state())
+            while busy() or self.clock.now() < until_s:
+                self.clock.sleep(POLL_S)
+                state = self.arm.state()
+                self.on_reading(state)
+                if float(np.abs(joints_of(state) - stood).max()) > STANDING_RAD:
+                    word = self.halt()
+                    if not word.stands:
+                        return _shouted(word, _MOVED_AGAIN), word
+                    return SafetyError(f"{_MOVED_AGAIN} It was stopped again: {word.text}."), word
+        return None
+
+
+def _shouted(word: StopReport, because: str) -> StopFailed:
+    """What the operator must be told first, said at once."""
+    with suppress(OSError):  # a terminal that is gone must not hide the rest
+        sys.stderr.write(f"\a\n*** {word.text} ***\n")
+        sys.stderr.flush()
+    return StopFailed(f"{word.text} {because}")
 
 
 def joints_of(state: ArmState) -> FloatArray:

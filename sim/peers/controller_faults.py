@@ -7,20 +7,27 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from drivers.arm import ArmState
+import numpy as np
+
+from drivers.arm import Arm, ArmState, MoveTarget
+
+_RESUMED_RAD = 0.3 * np.eye(6)[5]
+_RESUMED_RAD_S = 0.1
 
 
 class Stops(Enum):
     """What the controller makes of an order to stop.
 
     ``obeyed``; ``late``: taken, and obeyed `ControllerFaults.late_s` afterwards; ``ignored``:
-    taken, and the arm drives on to its target; ``refused``: answered with a refusal.
+    taken, and the arm drives on to its target; ``refused``: answered with a refusal; ``resumed``:
+    obeyed, and `late_s` after its halt the arm goes on, once, until it is stopped again.
     """
 
     OBEYED = "obeyed"
     LATE = "late"
     IGNORED = "ignored"
     REFUSED = "refused"
+    RESUMED = "resumed"
 
 
 @dataclass
@@ -68,8 +75,10 @@ class StopOrders:
     ----------
     faults:
         Asked anew for every order.
+    arm:
+        The arm that goes on without an order where the faults say so.
     halt:
-        Stops the arm; called with the reason.
+        Stops it; called with the reason.
     note:
         Called with what was not obeyed.
     """
@@ -77,10 +86,11 @@ class StopOrders:
     def __init__(
         self,
         faults: Callable[[], ControllerFaults],
+        arm: Arm,
         halt: Callable[[str], None],
         note: Callable[[str], None],
     ) -> None:
-        self._faults, self._halt, self._note = faults, halt, note
+        self._faults, self._arm, self._halt, self._note = faults, arm, halt, note
         self._late: threading.Timer | None = None
 
     @property
@@ -94,13 +104,23 @@ class StopOrders:
         if faults.stops is Stops.IGNORED:
             self._note(f"stop ignored: {why}")
         elif faults.stops is Stops.LATE:
-            self._halt_in(faults.late_s, why)
+            self._once_in(faults.late_s, lambda: self._halt(why))
         else:
             self._halt(why)
+        if faults.stops is Stops.RESUMED:
+            faults.stops = Stops.OBEYED
+            self._once_in(faults.late_s, self._resume)
 
-    def _halt_in(self, duration_s: float, why: str) -> None:
+    def _resume(self) -> None:
+        joints = np.asarray(self._arm.state().joints_rad) + _RESUMED_RAD
+        self._note("the arm goes on by itself")
+        self._arm.start_move(
+            MoveTarget(tuple(joints.tolist()), joint_speed_rad_s=_RESUMED_RAD_S, tcp_speed_m_s=1.0)
+        )
+
+    def _once_in(self, duration_s: float, act: Callable[[], None]) -> None:
         if self._late is None or not self._late.is_alive():
-            self._late = threading.Timer(duration_s, self._halt, (why,))
+            self._late = threading.Timer(duration_s, act)
             self._late.daemon = True
             self._late.start()
 

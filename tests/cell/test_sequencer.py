@@ -258,6 +258,28 @@ def test_a_failing_stop_is_the_loudest_error(
     assert bench.arm.calls.count("stop") > 10
 
 
+@pytest.mark.parametrize("obeys", [True, False])
+def test_an_arm_that_moves_again_after_a_confirmed_stop_is_stopped_again_and_that_is_told(
+    obeys: bool, bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def resume(status: Status) -> None:
+        if status.state is State.STOPPING and "confirm" in (status.event or ""):
+            bench.arm.start_move(MoveTarget(tuple(HOME + 0.4), joint_speed_rad_s=0.05))
+            bench.arm.obeys_after_s = 0.0 if obeys else np.inf
+
+    on_the_way(bench, lambda: bench.stop.ask("the Stop button"))
+    watcher = Watcher()
+    watcher.status_changed = resume  # type: ignore[method-assign]
+    bench.watchers = [watcher]
+    result = bench.run()
+    assert result.finish.exit_status == EXIT_SAFETY
+    assert "moved again after it had been stopped" in result.reason
+    assert bench.arm.moving is not obeys
+    assert ("PRESS THE EMERGENCY STOP" in capsys.readouterr().err) is not obeys
+    events = bench.events()
+    assert events.index("halt") < events.index("moved again") < events.index("stop")
+
+
 def test_a_terminal_that_is_gone_does_not_end_the_run(bench: Bench) -> None:
     class Gone(Watcher):
         def status_changed(self, status: Status) -> None:
@@ -361,7 +383,9 @@ def test_no_stop_is_ordered_from_an_arm_that_was_never_reached(bench: Bench) -> 
 
     bench.arm.connect = unreachable  # type: ignore[method-assign]
     bench.arm.stop_error = StopFailed("not connected")
-    assert bench.run().finish is Finish.DEVICE_FAILED
+    result = bench.run()
+    assert result.finish is Finish.DEVICE_FAILED
+    assert result.reason.startswith("no robot at 10.0.0.1. No motion was ordered")
 
 
 def test_an_arm_that_stops_by_itself_ends_the_run(bench: Bench) -> None:

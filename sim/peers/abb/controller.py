@@ -83,7 +83,7 @@ class ABBController:
         self.panel = PanelState()
         self.faults = ABBFaults()
         self.reported = Reported(arm.state, lambda: self.faults)
-        self.stop_orders = StopOrders(lambda: self.faults, self.halt, self.note)
+        self.stop_orders = StopOrders(lambda: self.faults, arm, self.halt, self.note)
         self.files: dict[str, bytes] = {}
         self.signals: dict[str, float] = {"Local/DRV_1/DRV1BRAKE": 1.0}
         self.rapid_data: dict[str, str] = {}

@@ -92,7 +92,7 @@ class URController:
         self.payload_cog_m: tuple[float, ...] = (0.0,) * 3
         self.remote_control = True
         self.faults = URFaults()
-        self.stop_orders = StopOrders(lambda: self.faults, self.halt, self.note)
+        self.stop_orders = StopOrders(lambda: self.faults, arm, self.halt, self.note)
         self.registers: dict[str, int | float] = {}
         self.events: list[Event] = []
         self.robot_mode = Robot.RUNNING
