@@ -171,7 +171,7 @@ def cross_validate(
     p = len(joint.unknowns)
     frames = frame_by_frame(joint, joint.model, views, joint.weight, joint.flange_error)
     marginal = frames.marginal(joint.noise.flange_information)
-    total = marginal[:, :p, :p].sum(axis=0) + np.diag(prior_information(joint.unknowns))
+    total = marginal[:, :p, :p].sum(axis=0) + prior_information(joint.unknowns)
     fold = fold_of(joint.dependence.state.distance_m)
     folds = [_without(fold == k, joint, views, marginal, total) for k in range(FOLDS)]
     quantities = quantities_of(joint, views, distance_range_m)

@@ -94,6 +94,10 @@ class Effect:
         Values of shapes and settings worth trying on these views.
     separable:
         Whether some of the amounts alone make sense; not so for the nodes of a curve.
+    roughness:
+        Rows of coefficients over the parameters: combinations of amounts that have a normal prior
+        of width one besides their own, such as what a curve may bend by from node to node. A node
+        that no frame supports then follows its neighbours.
     """
 
     name: str
@@ -114,6 +118,7 @@ class Effect:
     acts_along: tuple[tuple[str, str], ...] = ()
     candidates: Callable[[Views], Sequence[Mapping[str, float]]] = _one_candidate
     separable: bool = True
+    roughness: tuple[tuple[float, ...], ...] = ()
 
     @property
     def label(self) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from calib.chain.effect import Effect
 from calib.discovery.diagnosis import Ambiguity
@@ -53,6 +53,7 @@ _EXPERIMENTS = {
         "repeat the first poses at the end and midway: a slip happens once, a drift goes on"
     ),
 }
+_AGAINST_A_LAW = "views in which what the law follows varies and what the effect follows stays"
 _GENERAL = "more views in which the two differ: the plan of `separate_with`, if there is one"
 
 
@@ -74,8 +75,22 @@ def ambiguous_mixups(mixups: Sequence[Mixup]) -> tuple[Ambiguity, ...]:
     )
 
 
+def _rival_laws(search: Search) -> Iterator[Ambiguity]:
+    """For every name, the laws without a name that describe the data about as well."""
+    for present in search.best.fit.model.effects:
+        for law, behind in search.rival_laws.get(present.effect.label, ()):
+            yield Ambiguity(
+                names=(present.effect.name, law),
+                why=(
+                    f"a law without a name ({law}) is less likely by only {behind:.1f} in the"
+                    f" Bayesian criterion (below {UNDECIDED:g} is undecided)"
+                ),
+                experiment=_AGAINST_A_LAW,
+            )
+
+
 def ambiguities(search: Search) -> tuple[Ambiguity, ...]:
-    """For every effect taken in, the rivals that the data do not rule out."""
+    """For every effect taken in, the rivals that the data do not rule out, laws included."""
     found = []
     for step in search.steps:
         for rival, behind in step.rivals:
@@ -92,4 +107,4 @@ def ambiguities(search: Search) -> tuple[Ambiguity, ...]:
                     experiment=experiment(step.taken.effect, rival.effect),
                 )
             )
-    return tuple(found)
+    return (*found, *_rival_laws(search))

@@ -21,7 +21,7 @@ from calib.discovery.diagnosis import (
     Verdict,
 )
 from calib.discovery.history import with_history
-from calib.discovery.laws.arm_field import is_arm_field, made_anew, scatters_too_much
+from calib.discovery.laws.arm_field import is_arm_field, refitted, scatters_too_much
 from calib.discovery.laws.contest import begin_with_law, law_leads
 from calib.discovery.laws.found_law import found_law
 from calib.discovery.laws.surface_field import field_leads, fields_anew
@@ -231,13 +231,9 @@ def _diagnosis(
 
 def _with_field_anew(everything: Fitter, start: JointFit) -> JointFit:
     """Fit to all frames; a field of the arm is then one of all frames, too."""
-    known = next((p for p in start.model.effects if is_arm_field(p)), None)
-    if known is None:
-        return fields_anew(everything, everything.settled(start))
-    rest = tuple(p for p in start.model.effects if not is_arm_field(p))
-    bare = everything.fit(start.model.with_effects(rest), start.noise, start.own_error)
-    field = made_anew(bare, everything.views, known)
-    return everything.with_effects(bare, (*bare.model.effects, field))
+    if any(is_arm_field(p) for p in start.model.effects):
+        return refitted(everything, start)
+    return fields_anew(everything, everything.settled(start))
 
 
 def _restarted(fit: JointFit, frames: int, held: BoolArray) -> JointFit:

@@ -115,7 +115,8 @@ class _Probe:
         found = replace(self.found, local=local)
         shift = self.fit.equations.corner_shift if self.fit.equations.corner_numbers else None
         free = np.zeros(local.shape[2] - self.base)
-        prior = (np.append(self.amount, free), np.append(self.information, free))
+        information = np.pad(self.information, (0, len(free)))
+        prior = (np.append(self.amount, free), information)
         equations, _ = assemble(
             found, self.views, self.fit.weight, self.fit.own_error, shift, prior
         )

@@ -14,7 +14,7 @@ import numpy as np
 from calib.chain.effect import Present
 from calib.chain.empirical import UNNAMED
 from calib.chain.model import CellModel, predict
-from calib.discovery.laws.arm_field import is_arm_field, made_anew
+from calib.discovery.laws.arm_field import is_arm_field, made_anew, refitted
 from calib.discovery.laws.cross_validation import folds
 from calib.discovery.residual_structure import ResidualStructure, what_is_left
 from calib.discovery.search import Search
@@ -132,14 +132,12 @@ def drop_what_predicts_worse(
         worst = _worst(search, fit, held)
         dropped.append(Dropped(worst, now.rms_px, of_plain.rms_px))
         search.leave_out(worst)
+        search.go_on_from(refitted(search.fitter, search.best.fit))
     return (_judged_anew(structure), tuple(dropped)) if dropped else (structure, ())
 
 
 def _worst(search: Search, fit: JointFit, held: Views) -> Present:
-    """The effect without which other frames are predicted best; the arm's field before any."""
-    field = next((p for p in fit.model.effects if is_arm_field(p)), None)
-    if field is not None:
-        return field
+    """The effect without which other frames are predicted best."""
     rms_px = [
         missed_by(search.missed(p)[1], fit.weight, search.views, held).rms_px
         for p in fit.model.effects

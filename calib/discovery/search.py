@@ -110,6 +110,7 @@ class Search:
         self.fitter, self.views = fitter, fitter.views
         self.choices: dict[str, float] = {}
         self.prices: dict[str, float] = {}
+        self.rival_laws: dict[str, tuple[tuple[str, float], ...]] = {}
         self.best = Trial(start, criterion(start, fitter.views))
         self.steps: list[Step] = []
 
@@ -302,6 +303,12 @@ class Search:
     def go_on_from(self, fit: JointFit) -> None:
         """Go on from another fit of the same effects."""
         self._settle(fit)
+
+    def go_on_without_others(self, fit: JointFit) -> None:
+        """Go on from a fit of some of the effects; the others lose their names."""
+        labels = {p.effect.label for p in fit.model.effects}
+        self._settle(fit)
+        self.steps = [s for s in self.steps if s.taken.effect.label in labels]
 
     def take_in(self, candidate: Candidate, fit: JointFit) -> None:
         """Go on from a fit with one more effect, which is no name."""

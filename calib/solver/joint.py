@@ -170,7 +170,7 @@ def assemble(
     """Normal equations in the frames' own errors and shared numbers; and (N, M, 2) residuals.
 
     `prior` has how far the p shared numbers are from the centres of their priors, and the inverse
-    variances of these.
+    covariance of these.
     """
     state = found.state
     parts: list[FrameEquations] = []
@@ -257,7 +257,7 @@ class _Iteration:
         pull = at.own_error @ at.noise.own_information
         cost += float(np.sum(pull * at.own_error))
         amount = amounts(at.model, self.unknowns, self.about)
-        cost += float(np.sum(amount**2 * self.information))
+        cost += float(amount @ self.information @ amount)
         if self.with_print:
             cost += float(np.sum(_shift_of(at.model, self.views) ** 2)) / at.noise.print_m**2
         return cost
@@ -267,7 +267,7 @@ class _Iteration:
         found, noise = self.equations, self.state.noise
         cost = found.frames.square_sum / noise.corner_px**2
         cost += float(np.sum(found.own_error @ noise.own_information * found.own_error))
-        cost += float(np.sum(found.amount**2 * found.amount_information))
+        cost += float(found.amount @ found.amount_information @ found.amount)
         if self.with_print:
             cost += float(np.sum(found.corner_shift**2)) / noise.print_m**2
         return cost

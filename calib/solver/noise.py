@@ -82,7 +82,7 @@ class JointEquations:
     own_error, corner_shift, amount:
         (N, F), (C,) and (p,) where the unknowns with a prior stand now.
     amount_information:
-        (p,) inverse variances of the amounts' priors.
+        (p, p) inverse covariance of the amounts' priors.
     corner_numbers, observations:
         C and the number of scalar observations, each counted by its weight.
     """
@@ -126,22 +126,29 @@ def scaled(
     frames, information = equations.frames, noise.corner_px**-2.0
     prior = noise.own_information
     shared_at = np.concatenate([equations.amount, equations.corner_shift])
-    print_information = noise.print_m**-2.0 if equations.corner_numbers else 0.0
-    shared_prior = np.concatenate(
-        [equations.amount_information, np.full(equations.corner_numbers, print_information)]
-    )
+    shared_prior = _shared_prior(equations, noise)
     pull = equations.own_error @ prior
-    shared_pull = shared_prior * shared_at
+    shared_pull = shared_prior @ shared_at
     square = float(np.sum(equations.own_error * pull)) + float(shared_pull @ shared_at)
     weighted = FrameEquations(
         own=frames.own * information,
         own_shared=frames.own_shared * information,
         own_residual=frames.own_residual * information - pull,
-        shared=frames.shared * information + np.diag(shared_prior),
+        shared=frames.shared * information + shared_prior,
         shared_residual=frames.shared_residual * information - shared_pull,
         square_sum=frames.square_sum * information + square,
     )
     return eliminate(weighted, prior, damping), shared_prior
+
+
+def _shared_prior(equations: JointEquations, noise: Noise) -> FloatArray:
+    """(p + C, p + C) inverse covariance of all priors of the shared numbers."""
+    p, c = len(equations.amount), equations.corner_numbers
+    information = np.zeros((p + c, p + c))
+    information[:p, :p] = equations.amount_information
+    if c:
+        information[range(p, p + c), range(p, p + c)] = noise.print_m**-2.0
+    return information
 
 
 def profile(equations: JointEquations, noise: Noise, *, restricted: bool = True) -> Profile:
@@ -195,11 +202,9 @@ def _slope(
     kept = information * variance.sum(axis=0)
     square = information * np.sum(own**2, axis=0)
     shared = np.concatenate([equations.amount, equations.corner_shift]) + found.step
-    prior = np.concatenate(
-        [equations.amount_information, np.full(c, noise.print_m**-2.0 if c else 0.0)]
-    )
-    shared_kept = prior[first:] * np.diag(integrated)
-    shared_square = prior * shared**2
+    prior = _shared_prior(equations, noise)
+    shared_kept = np.sum(prior[first:, first:] * integrated, axis=1)
+    shared_square = shared * (prior @ shared)
     n = len(own)
     rank = float(np.sum(integrated * reduced.shared[first:, first:]))
     freedom = n * own.shape[1] + rank - kept.sum() - shared_kept.sum()

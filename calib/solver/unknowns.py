@@ -34,13 +34,17 @@ image (all lengths of the arm, the board's scale) run off together to wherever n
 
 @dataclass(frozen=True)
 class Unknown:
-    """One free number: where it stands, its usual size, its unit, and how wide its prior is."""
+    """One free number: where it stands, its usual size, its unit, and how wide its prior is.
+
+    `roughness` are its coefficients in combinations of its effect's amounts that have a prior, too.
+    """
 
     name: str
     unit: str
     typical: float
     place: tuple[str, int, int]
     prior_sigma: float = np.inf
+    roughness: tuple[float, ...] = ()
 
 
 def _prior_sigma(parameter: Parameter) -> float:
@@ -56,6 +60,7 @@ def _free_of(present: Present, at: int) -> list[Unknown]:
             p.typical,
             ("effect", at, k),
             _prior_sigma(p) if p.role == "amount" else np.inf,
+            tuple(row[k] for row in effect.roughness),
         )
         for k, p in enumerate(effect.parameters)
         if p.role != "setting" and p.identifiable and k not in present.held
@@ -138,8 +143,13 @@ def _amount(model: CellModel, unknown: Unknown, about: CellModel | None) -> floa
 
 
 def prior_information(unknowns: tuple[Unknown, ...]) -> FloatArray:
-    """(p,) inverse variances of the priors; zero where there is none."""
-    return np.array([u.prior_sigma**-2.0 for u in unknowns])
+    """(p, p) inverse covariance of the priors; zero where there is none."""
+    information = np.diag([u.prior_sigma**-2.0 for u in unknowns])
+    for effect in {u.place[1] for u in unknowns if u.roughness}:
+        mine = [k for k, u in enumerate(unknowns) if u.roughness and u.place[1] == effect]
+        rows = np.array([unknowns[k].roughness for k in mine])
+        information[np.ix_(mine, mine)] += rows @ rows.T
+    return information
 
 
 def _nudged(present: Present, k: int, amount: float, bounded: bool) -> Present:

@@ -28,11 +28,11 @@ def test_the_frames_sum_up_to_the_fit() -> None:
     p = len(fit.unknowns)
     prior = prior_information(fit.unknowns)
     scale = np.sqrt(np.diag(reduced.shared))
-    shared = (total[:p, :p] + np.diag(prior) - reduced.shared) / scale / scale[:, None]
+    shared = (total[:p, :p] + prior - reduced.shared) / scale / scale[:, None]
     assert np.abs(shared).max() < 1e-6
-    score = total[:p, p] - prior * fit.equations.amount - reduced.shared_residual
+    score = total[:p, p] - prior @ fit.equations.amount - reduced.shared_residual
     assert np.abs(score / scale).max() < 1e-6
-    square = total[p, p] + float(prior @ fit.equations.amount**2)
+    square = total[p, p] + float(fit.equations.amount @ prior @ fit.equations.amount)
     assert np.isclose(square, reduced.square_sum, rtol=1e-6)
 
 

@@ -42,7 +42,7 @@ def _equations(corners: int, own: int, seed: int = 3) -> JointEquations:
         own_error=0.1 * own_truth,
         corner_shift=0.1 * shift,
         amount=random.normal(size=SHARED) * 0.01,
-        amount_information=np.array([0.0, 0.0, 4.0, 0.0, 100.0]),
+        amount_information=np.diag([0.0, 0.0, 4.0, 0.0, 100.0]),
         corner_numbers=corners,
         observations=float(FRAMES * rows),
     )

@@ -7,6 +7,7 @@ camera) is integrated out.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 
@@ -20,6 +21,7 @@ from calib.discovery.laws.frames import FrameNormals, frame_normals
 from calib.discovery.locate import Cell
 from calib.discovery.score import Score, pose_numbers
 from calib.discovery.search import Search
+from calib.discovery.start import Fitter
 from calib.distributions import chi2_tail
 from calib.solver.joint import JointFit
 from calib.views import FloatArray, Views
@@ -75,7 +77,7 @@ class _Scatter:
             fit.own_error / self.unit + np.einsum("nij,nj->ni", self.noise, pulled)
         ).ravel()
         self.design = back.reshape(n * f, t)
-        self.information = np.diag(normals.prior) + scale * normals.shared.sum(axis=0)
+        self.information = normals.prior + scale * normals.shared.sum(axis=0)
         self.information -= np.einsum("nft,nfs->ts", cross, back)
         self.gradient = normals.pull + scale * normals.gradient.sum(axis=0)
         self.gradient -= np.einsum("nft,nf->t", back, pulled)
@@ -199,39 +201,88 @@ def is_arm_field(present: Present) -> bool:
     return present.effect.law is not None and present.effect.law.startswith(FIELD)
 
 
-def _instead_of_laws(search: Search) -> ArmField | None:
-    """The field that explains more than the laws of poses do, which are then taken out."""
-    effects = search.best.fit.model.effects
-    is_law = [p.effect.name == UNNAMED and p.effect.link in _POSE_LINKS for p in effects]
-    if not any(is_law):
-        return None
-    rest = tuple(p for p, law in zip(effects, is_law, strict=True) if not law)
-    bare = search.fitter.with_effects(search.best.fit, rest)
-    found = find_arm_field(bare, search.views)
-    worth = search.criterion_of(bare) - search.best.criterion
-    if found is None or found.gain - _price(search.views) < worth:
-        return None
-    search.go_on_from(bare)
-    return found
+def refitted(fitter: Fitter, fit: JointFit) -> JointFit:
+    """Fit a cell; a field of the arm that it has is then one of the fitter's frames and this fit.
+
+    Without such a field the fit is returned as it is.
+    """
+    known = next((p for p in fit.model.effects if is_arm_field(p)), None)
+    if known is None:
+        return fit
+    rest = tuple(p for p in fit.model.effects if not is_arm_field(p))
+    bare = fitter.fit(fit.model.with_effects(rest), fit.noise, fit.own_error)
+    field = made_anew(bare, fitter.views, known)
+    return fitter.with_effects(bare, (*rest, field))
 
 
-def _price(views: Views) -> float:
-    """The price of a field's three numbers."""
-    return _NUMBERS * float(np.log(pose_numbers(views)))
+@dataclass(frozen=True)
+class _Beside:
+    """A cell, the field of the arm that its errors demand, and the criterion with both."""
+
+    fit: JointFit
+    field: ArmField | None
+    criterion: float
+
+
+def _beside(search: Search, fit: JointFit) -> _Beside:
+    """What a field of the arm adds to a fit, at the price of its three numbers."""
+    found = find_arm_field(fit, search.views)
+    price = _NUMBERS * float(np.log(pose_numbers(search.views)))
+    gain = 0.0 if found is None else max(found.gain - price, 0.0)
+    return _Beside(fit, found, search.criterion_of(fit) - gain)
+
+
+def _shown_by_poses(present: Present) -> bool:
+    """Whether only poses show it, so that a field of the arm might explain it as well."""
+    if present.effect.name == UNNAMED:
+        return present.effect.link in _POSE_LINKS
+    return not present.effect.seen_without_robot and bool(present.free)
+
+
+def _instead_of_effects(search: Search) -> _Beside:
+    """The cell and field of the lowest criterion, names and laws that only poses show left out.
+
+    All of them at once, or one after the other as long as that lowers the criterion: on a real arm
+    each takes a share of the one field that all of them stand in for.
+    """
+    fit = search.best.fit
+    best = _beside(search, fit)
+    doubtful = [p for p in fit.model.effects if _shown_by_poses(p)]
+    if not doubtful:
+        return best
+    none = _beside(search, _without(search, fit, doubtful))
+    if best.field is None and none.field is None:
+        return best
+    while doubtful:
+        tries = [(_beside(search, _without(search, best.fit, [p])), p) for p in doubtful]
+        shorter, left_out = min(tries, key=lambda one: one[0].criterion)
+        if shorter.criterion > best.criterion:
+            break
+        best = shorter
+        doubtful = [p for p in doubtful if p.effect.label != left_out.effect.label]
+    return min(best, none, key=lambda one: one.criterion)
+
+
+def _without(search: Search, fit: JointFit, left_out: Sequence[Present]) -> JointFit:
+    labels = {p.effect.label for p in left_out}
+    rest = tuple(p for p in fit.model.effects if p.effect.label not in labels)
+    return search.fitter.with_effects(fit, rest)
 
 
 def with_arm_field(search: Search) -> list[Cell]:
     """Put a field of the arm into the cell where its errors demand one; its cell.
 
-    Laws that only poses show give way to a field that explains more than all of them: errors that
-    are alike in poses near to each other follow, by chance, many a covariate for a while.
+    Names and laws that only poses show give way to a field that explains more for its price:
+    errors that are alike in poses near to each other follow, by chance, many a covariate for a
+    while.
     """
-    fit = search.best.fit
     if not search.fitter.has_robot:
         return []
-    found = _instead_of_laws(search) or find_arm_field(fit, search.views)
+    best = _instead_of_effects(search)
+    found = best.field
     if found is None:
         return []
+    search.go_on_without_others(best.fit)
     fit = search.best.fit
     search.go_on_from(search.fitter.with_effects(fit, (*fit.model.effects, found.present)))
     p_value = chi2_tail(found.gain, _NUMBERS)

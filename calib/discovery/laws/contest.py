@@ -106,11 +106,16 @@ def along_its_own(effect: Effect, law: Law) -> bool:
     return not places.isdisjoint(effect.acts_along)
 
 
-def _rival(rival: Tried, best: Tried) -> str:
-    law = rival.found.law
+def in_words(tried: Tried) -> str:
+    """Form, site and covariates of a law."""
+    law = tried.found.law
     along = " * ".join(covariate.name for covariate in law.covariates)
+    return f"{law.form.name}: {law.site.name} along {along}"
+
+
+def _rival(rival: Tried, best: Tried) -> str:
     behind = rival.trial.criterion - best.trial.criterion
-    return f"{law.form.name}: {law.site.name} along {along} ({behind:.1f} behind)"
+    return f"{in_words(rival)} ({behind:.1f} behind)"
 
 
 def as_cell(best_first: Sequence[Tried], before: Trial) -> Cell:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from calib.chain.covariates import CONSTANT
 from calib.chain.empirical import Curve, Site, present_curve, site_columns
@@ -49,7 +50,7 @@ class FrameBlocks:
     information, gradient:
         (N, T + S, T + S) and (N, T + S), corner noise and the frames' own errors accounted for.
     prior, pull:
-        (T,) inverse variances of the shared numbers' priors, and their gradient.
+        (T, T) inverse covariance of the shared numbers' priors, and (T,) their gradient.
     pixel_information, pixel_gradient, pixel_square, corners:
         (N, T + S, T + S), (N, T + S), (N,) and (N,): the same form of the squared distances (px) of
         the corners from where the log alone has them, its constant, and the corners' weights.
@@ -69,7 +70,7 @@ class FrameBlocks:
     @property
     def shared(self) -> int:
         """T, how many numbers of the fit are shared."""
-        return len(self.prior)
+        return len(self.pull)
 
     def base(self, frames: BoolArray | None = None) -> tuple[FloatArray, FloatArray]:
         """(T, T) information and (T,) gradient of the shared numbers from some frames."""
@@ -77,7 +78,7 @@ class FrameBlocks:
         information, gradient = self.information[:, :t, :t], self.gradient[:, :t]
         if frames is not None:
             information, gradient = information[frames], gradient[frames]
-        return information.sum(axis=0) + np.diag(self.prior), gradient.sum(axis=0) + self.pull
+        return information.sum(axis=0) + self.prior, gradient.sum(axis=0) + self.pull
 
 
 def frame_blocks(fit: JointFit, views: Views) -> FrameBlocks:
@@ -144,12 +145,12 @@ def frame_normals(fit: JointFit, views: Views) -> FrameNormals:
 
 
 def _priors(fit: JointFit) -> tuple[FloatArray, FloatArray]:
-    """(T,) inverse variances of the shared numbers' priors, and their gradient."""
+    """(T, T) inverse covariance of the shared numbers' priors, and (T,) their gradient."""
     corners = fit.equations.corner_numbers
     print_information = fit.noise.print_m**-2.0 if corners else 0.0
-    prior = np.concatenate([prior_information(fit.unknowns), np.full(corners, print_information)])
+    prior = block_diag(prior_information(fit.unknowns), print_information * np.eye(corners))
     at = np.concatenate([amounts(fit.model, fit.unknowns), fit.equations.corner_shift])
-    return prior, -prior * at
+    return prior, -prior @ at
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from calib.discovery.laws.contest import (
     along_its_own,
     as_cell,
     fitted,
+    in_words,
     promising,
     shortest_first,
 )
@@ -21,7 +22,7 @@ from calib.discovery.laws.cross_validation import CrossValidation
 from calib.discovery.laws.frames import frame_blocks
 from calib.discovery.locate import Cell
 from calib.discovery.score import Score, bic, conditional, extended, group_score, score_effects
-from calib.discovery.search import DEMAND, Search, blank
+from calib.discovery.search import DEMAND, UNDECIDED, Search, blank
 from calib.solver.joint import JointFit
 from calib.views import Views
 
@@ -46,16 +47,19 @@ def replaced_by_laws(search: Search) -> list[Cell]:
             if law.gain > _AS_GOOD * score.gain and not along_its_own(present.effect, law.law)
         ]
         base = search.best.criterion + missed
-        better = [
-            one for one in fitted(without, search, laws) if _beats(one, base, search.best.criterion)
-        ]
+        laws_fitted = fitted(without, search, laws)
+        tried = [(one, _behind(one, base, search.best.criterion)) for one in laws_fitted]
+        better = [one for one, behind in tried if behind < 0.0]
+        search.rival_laws[label] = tuple(
+            (in_words(one), behind) for one, behind in tried if 0.0 <= behind < UNDECIDED
+        )
         if better:
             cells.append(_put_in(search, shortest_first(better), label))
     return cells
 
 
-def _beats(law: Tried, without: float, with_name: float) -> bool:
-    """Whether a law is better than a name, both against the criterion without either.
+def _behind(law: Tried, without: float, with_name: float) -> float:
+    """By how much a law is worse than a name, both against the criterion without either.
 
     A law that is beyond chance by itself, at the price of all among which it was picked, is no fit
     to noise: against the name it pays for the fifty or so (`DEMAND` is twice the logarithm of
@@ -64,7 +68,7 @@ def _beats(law: Tried, without: float, with_name: float) -> bool:
     reached = law.trial.criterion
     if without - reached >= DEMAND:
         reached += min(0.0, DEMAND - 2.0 * law.found.choices)
-    return reached < with_name
+    return reached - with_name
 
 
 def _put_in(search: Search, tried: list[Tried], label: str) -> Cell:

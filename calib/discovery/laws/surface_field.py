@@ -86,7 +86,7 @@ class _Normals:
     information, gradient:
         (K, T + B, T + B) and (K, T + B): T shared numbers, then B amounts of waves.
     prior, pull:
-        (T,) of the shared numbers.
+        (T, T) and (T,) of the shared numbers.
     over:
         The finest rectangle; coarser ones have the first so many of its waves.
     spread:
@@ -120,7 +120,7 @@ class _Normals:
         """The same of the amounts alone, the shared numbers integrated out."""
         information, gradient = self.summed(waves)
         t = len(self.prior)
-        root = inverse_root(information[:t, :t] + np.diag(self.prior))
+        root = inverse_root(information[:t, :t] + self.prior)
         carried = root.T @ information[:t, t:]
         own = information[t:, t:] - carried.T @ carried
         return own, gradient[t:] - carried.T @ (root.T @ (gradient[:t] + self.pull))
@@ -210,7 +210,7 @@ def _left_out_gain(normals: _Normals, prior: FloatArray) -> float:
     t, gained = len(normals.prior), 0.0
     root = normals.root(prior)
     into = block_diag(np.eye(t), root)
-    own = np.diag(np.concatenate([normals.prior, np.ones(root.shape[1])]))
+    own = block_diag(normals.prior, np.eye(root.shape[1]))
     every = np.arange(len(normals.gradient))
     for k in every:
         train, gradient = normals.summed(len(prior), every != k)
@@ -261,7 +261,7 @@ def _normals(fit: JointFit, views: Views, surface: Surface) -> _Normals:
     information, gradient = (np.array(part) for part in zip(*parts, strict=True))
     at = np.concatenate([amounts(bare, fit.unknowns), fit.equations.corner_shift[:corners]])
     printed = fit.noise.print_m**-2.0 if corners else 0.0
-    prior = np.concatenate([prior_information(fit.unknowns), np.full(corners, printed)])
+    prior = block_diag(prior_information(fit.unknowns), printed * np.eye(corners))
     place = views.corners_px[views.seen] if surface is IMAGE else views.board.corners_m[:, :2]
     functions = over.functions(place)
     products = functions.T @ functions / len(place)
@@ -269,7 +269,7 @@ def _normals(fit: JointFit, views: Views, surface: Surface) -> _Normals:
     smooth = _smooth(surface, place, sides).reshape(len(place), -1, len(surface.components))
     alike = np.einsum("pcd,pw->cwd", smooth, functions).astype(np.float64)
     return _Normals(
-        information, gradient, prior, -prior * at, over, spread, alike.reshape(len(alike), -1)
+        information, gradient, prior, -prior @ at, over, spread, alike.reshape(len(alike), -1)
     )
 
 

@@ -166,6 +166,8 @@ class _Around:
             return Separation(None, "", "too few other views can be reached from where it was")
         effects = self.found.twin.model.effects
         first = next((p for p in effects if p.effect.name == pair.names[0]), None)
+        if all(effect.name != pair.names[1] for effect in catalogue()):
+            return Separation(None, "", f"no plan is made for a law: {pair.experiment}")
         if first is None:
             return Separation(None, "", f"no plan of poses can: {pair.experiment}")
         design = self._design(first, _rival(pair.names[1], self.found.views))

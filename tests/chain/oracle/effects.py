@@ -217,7 +217,7 @@ def _(p: Numbers, scene: Scene) -> None:
 
 
 def _natural_spline(height: Array, at: Array) -> Array:
-    """Through equidistant heights from 0 to 1, by its second derivatives; the ends go on."""
+    """Through equidistant heights from 0 to 1, by its second derivatives; straight beyond."""
     count = len(height) - 1
     h = 1.0 / count
     rows = np.eye(count + 1)
@@ -227,6 +227,12 @@ def _natural_spline(height: Array, at: Array) -> Array:
     for k in range(1, count):
         second[k, k - 1 : k + 2] = np.array([1.0, -2.0, 1.0]) / h
     bend = anp.dot(np.linalg.solve(rows, second), height)
+    if bool(at < 0.0):
+        slope = (height[1] - height[0]) / h - h * (2.0 * bend[0] + bend[1]) / 6.0
+        return height[0] + slope * at
+    if bool(at > 1.0):
+        slope = (height[-1] - height[-2]) / h + h * (bend[-2] + 2.0 * bend[-1]) / 6.0
+        return height[-1] + slope * (at - 1.0)
     k = sum(bool(at > node * h) for node in range(1, count))
     left, right = (k + 1) - at / h, at / h - k
     straight = left * height[k] + right * height[k + 1]
