@@ -58,9 +58,15 @@ def is_shape_of_law(cell: Cell, search: Search) -> bool:
 def what_is_left(search: Search) -> Cell | None:
     """The most significant cell that is more than chance and no named effect's shape, if any."""
     fit, views = search.best.fit, search.views
-    reported = alarms(locate(fit, views, periods=False))
+    cells = locate(fit, views, periods=False)
+    least = ALARM / max(len(cells), 1)
     return next(
-        (c for c in reported if not is_shape_of_law(c, search) and stands_out(fit, views, c)), None
+        (
+            cell
+            for cell in alarms(cells)
+            if not is_shape_of_law(cell, search) and stands_out(fit, views, cell, least)
+        ),
+        None,
     )
 
 

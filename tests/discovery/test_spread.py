@@ -28,7 +28,7 @@ def test_a_focal_length_that_follows_the_distance_stands_out():
     views = record(plain_cell().with_effects([breathing]), LOG, 41)
     fit, cells = located(views)
     assert cells[0].p_value < 1e-9
-    assert stands_out(fit, views, cells[0])
+    assert stands_out(fit, views, cells[0], 1e-6)
 
 
 def test_a_few_frames_far_off_are_significant_and_do_not_stand_out():
@@ -41,3 +41,16 @@ def test_a_few_frames_far_off_are_significant_and_do_not_stand_out():
     fit, cells = located(views)
     assert cells[0].p_value < 1e-4
     assert not any(stands_out(fit, views, cell) for cell in cells[:20])
+
+
+def test_a_lens_that_differs_from_picture_to_picture_follows_nothing():
+    """Corners of one picture that err alike: more than their number says, along anything."""
+    views = record(plain_cell(), LOG, 44)
+    away = views.corners_px - np.array([1024.0, 768.0])
+    square = (away**2).sum(axis=2, keepdims=True) / 1024.0**2
+    amount = np.random.default_rng(45).normal(0.0, 2e-3, (len(views), 1, 1))
+    views = replace(views, corners_px=views.corners_px + amount * away * square)
+    fit, cells = located(views)
+    of_lens = [c for c in cells if c.site == "radial_distortion" and c.p_value < 1e-4]
+    assert len(of_lens) > 1
+    assert not any(stands_out(fit, views, cell, 1e-5) for cell in of_lens)

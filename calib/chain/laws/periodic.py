@@ -1,4 +1,4 @@
-"""Swinging with the covariate: a gear's or an encoder's error, a base that sways."""
+"""Swinging with the covariate: a gear's or an encoder's error, a base that sways, a focus drive."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ MOST_CYCLES = 330
 """Cycles a turn: a strain-wave gear of ratio 160 makes two waves a turn of its input (320)."""
 
 _TIME_STEPS = 240
+
+_FOCUS = ("inverse_distance", "focus_position")
+"""A focus drive's lead screw turns with these."""
 
 
 def _of(x: Sequence[FloatArray], ranges: Sequence[Range], numbers: Numbers) -> FloatArray:
@@ -44,6 +47,6 @@ FORM = Form(
     numbers=(Number("cycles", -1, fitted=True),),
     of=_of,
     tried=_tried,
-    fits=lambda name, value: name == "time" or name.startswith("joint_"),
+    fits=lambda name, value: name == "time" or name in _FOCUS or name.startswith("joint_"),
     terms=_terms,
 )

@@ -100,7 +100,12 @@ def begin_with_law(search: Search, least: float) -> Cell | None:
 
 
 def along_its_own(effect: Effect, law: Law) -> bool:
-    """Whether the law is along what the effect acts along: the same physics, in another form."""
+    """Whether the law is along what the effect acts along: the same physics, in another form.
+
+    No effect swings along what it is said to act along: one that does is other physics.
+    """
+    if law.form.key == "periodic":
+        return False
     places = {(law.site.name, c.name.removeprefix("inverse_")) for c in law.covariates}
     places |= {(site, "distance") for site, along in places if along == "focus_distance"}
     return not places.isdisjoint(effect.acts_along)
