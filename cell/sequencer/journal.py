@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from cell.storage.files.plan_file import Plan
 from cell.storage.incoming import plain_file, read_bytes
 from cell.storage.incoming.limits import LOG_BYTES
 from cell.storage.recording.disk import disk_errors, write_synced
+from cell.storage.recording.file_watch import gone
 
 FILE_NAME = "journal.jsonl"
 
@@ -40,10 +42,12 @@ class Journal:
             self._file.write(b"\n")
 
     def write(self, event: str, **values: Any) -> None:
-        """Append one event and sync it to the disk; raises `DiskFailed`."""
+        """Append one event and sync it to the disk; raises `DiskFailed`, also where it is gone."""
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
         line = json.dumps({"event": event, "at": now, **values}, default=str)
         with disk_errors(self._path):
+            if os.fstat(self._file.fileno()).st_nlink == 0:
+                raise gone(self._path)
             write_synced(self._file, line.encode() + b"\n")
 
     def close(self) -> None:

@@ -40,7 +40,7 @@ from cell.storage.files.plan_file import Plan
 from cell.storage.recording import FrameRecord, RecordingWriter
 from drivers.arm import Arm, ArmState
 from drivers.camera import Camera, FocusSetting, Frame
-from drivers.errors import FrameMissing
+from drivers.errors import DeviceUnreachable, FrameMissing
 
 _LAST_FRAME_S = 30.0
 
@@ -115,6 +115,7 @@ class Sequencer:
         self._started_s = self._clock.now() if started_s is None else started_s
         self._worker = Worker()
         self._goal, self._ended_early = goal, ""
+        self._stands = ""
         self._state = State.IDLE
         self._index: int | None = None
         self._checking: tuple[Shot, Future[Verdict]] | None = None
@@ -143,6 +144,8 @@ class Sequencer:
         self._let_go()
         finish = finish_of(error, len(self._progress.skipped))
         reason = str(error or "") or (type(error).__name__ if error else "")
+        if isinstance(error, DeviceUnreachable) and self._stands:
+            reason = f"{reason.rstrip('.')}. Afterwards {self._stands}."
         self._note("stop", finish=finish.name.lower(), reason=reason or self._ended_early)
         self._notify(State.FINISHED)
         if error is not None and exit_status_of(error) is None:
@@ -168,6 +171,7 @@ class Sequencer:
             if fault is not None and word.stands:
                 self._notify(State.STOPPING, word.text)
             if word.stands:
+                self._stands = word.text
                 return self._stand_by(error, last_s)
         return error
 

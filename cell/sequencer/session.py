@@ -126,10 +126,18 @@ def _set_detections_aside(folder: Path) -> None:
 def _elapsed_s(
     events: list[dict[str, Any]], frames: tuple[FrameRecord, ...], simulated: bool
 ) -> float:
-    """Seconds since the recording's clock was 0; a simulated cell's time stood still meanwhile."""
+    """Seconds since the recording's clock was 0; a simulated cell's time stood still meanwhile.
+
+    A computer's clock may have been set back meanwhile: no frame is older than the last one.
+    """
+    last_s = max((frame.t_s for frame in frames if frame.t_s is not None), default=0.0)
     if simulated:
-        return max((frame.t_s for frame in frames if frame.t_s is not None), default=0.0)
-    return max(0.0, time.time() - float(events[0]["unix_s"]))
+        return last_s
+    start = next(event for event in events if event.get("event") == "start")
+    try:
+        return max(last_s, time.time() - float(start["unix_s"]))
+    except (KeyError, TypeError, ValueError):
+        return last_s
 
 
 def recorded_robot(robot: SimulatedRobot) -> dict[str, Any]:

@@ -251,6 +251,7 @@ def test_resume_cuts_the_half_line_and_sets_unlogged_pictures_aside(tmp_path: Pa
         (lambda r: _replaced(r / "frames.jsonl"), r"frames.jsonl: was deleted, cut or repl"),
         (lambda r: os.truncate(r / "frames.jsonl", 5), r"frames.jsonl: has 5 bytes"),
         (lambda r: (r / "frames.jsonl").write_text("x" * 999), r"frames.jsonl: has 999 bytes"),
+        (lambda r: (r / "recording.yaml").unlink(), r"recording.yaml: was deleted"),
         (lambda r: shutil.rmtree(r / "images"), r"images: was deleted"),
         (lambda r: (r / "images").rename(r / "elsewhere"), r"images: was deleted"),
         (lambda r: (r / "images" / "00001.png").unlink(), r"00001.png: was deleted"),
@@ -277,6 +278,16 @@ def _replaced(path: Path) -> None:
     other = path.with_name("other")
     other.write_bytes(path.read_bytes())
     other.replace(path)
+
+
+def test_a_recording_that_is_moved_while_it_is_written_is_called_so(tmp_path: Path) -> None:
+    with RecordingWriter.create(tmp_path / "r", header()) as writer:
+        writer.append(FrameRecord(frame=0), np.zeros((4, 4), np.uint8))
+        # the very instant between the look at the names and the writing
+        writer._kept.check = lambda: (tmp_path / "r").rename(tmp_path / "moved")  # type: ignore
+        with pytest.raises(DiskFailed, match="moved or deleted"):
+            writer.append(FrameRecord(frame=1), np.zeros((4, 4), np.uint8))
+    assert [frame.frame for frame in read_recording(tmp_path / "moved").frames] == [0]
 
 
 def test_an_older_picture_that_is_gone_is_noticed_at_the_end(tmp_path: Path) -> None:

@@ -171,6 +171,7 @@ def test_a_camera_that_dies_stops_the_arm_first(bench: Bench) -> None:
     assert result.finish is Finish.DEVICE_FAILED
     assert result.finish.exit_status == EXIT_DEVICE
     assert "10.0.0.2" in result.reason
+    assert "Afterwards the arm stands: readings confirm it" in result.reason
     assert len(read_recording(bench.folder).frames) == 1
     assert bench.events()[-1] == "stop"
 

@@ -18,6 +18,7 @@ from cell.sequencer.session import record_plan
 from cell.sequencer.states import Finish
 from cell.storage.files.plan_file import Plan, read_plan
 from cell.storage.recording import read_recording
+from drivers.camera import Frame
 from tests.cell.fakes import FakeArm, FakeCamera, FastClock
 from tests.cell.plans import CELL, PLAN
 
@@ -54,6 +55,35 @@ def test_a_run_can_be_stopped_and_gone_on_with(tmp_path: Path) -> None:
             went_on.approach_joints_rad, whole.approach_joints_rad, atol=1e-12
         )
     assert "resume" in [event["event"] for event in read_journal(tmp_path / "run")]
+
+
+def test_a_clock_that_was_set_back_puts_no_frame_before_the_last_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = make_plan(tmp_path)
+    broken = devices()
+    broken.camera.grabs = [None, None, RuntimeError("a bug")]  # type: ignore[attr-defined]
+    with pytest.raises(RuntimeError):
+        record_plan(plan, tmp_path / "run", broken)
+    monkeypatch.setattr(time, "time", lambda: 1e9)  # of the year 2001
+    record_plan(plan, tmp_path / "run", devices(), resume=True)
+    times = [frame.t_s or 0.0 for frame in read_recording(tmp_path / "run").frames]
+    assert times == sorted(times)
+    assert times[0] >= 0.0
+
+
+def test_a_journal_that_is_deleted_ends_the_run(tmp_path: Path) -> None:
+    gone = devices()
+    grab = gone.camera.grab
+
+    def grab_and_delete(timeout_s: float) -> Frame:
+        (tmp_path / "run" / "journal.jsonl").unlink(missing_ok=True)
+        return grab(timeout_s)
+
+    gone.camera.grab = grab_and_delete  # type: ignore[method-assign]
+    result = record_plan(make_plan(tmp_path), tmp_path / "run", gone)
+    assert result.finish is Finish.DEVICE_FAILED
+    assert "journal.jsonl: was deleted" in result.reason
 
 
 def test_corners_found_before_a_resume_do_not_stand_for_the_whole(tmp_path: Path) -> None:

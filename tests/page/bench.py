@@ -63,10 +63,18 @@ def ask(
 
 
 def connect(
-    url: str, path: str, *, method: str = "GET", query: str = "", **headers: str
+    url: str,
+    path: str,
+    *,
+    method: str = "GET",
+    query: str = "",
+    source: str = "127.0.0.1",
+    **headers: str,
 ) -> HTTPResponse:
     parts = urlsplit(url)
-    connection = HTTPConnection(parts.hostname or "", parts.port, timeout=20)
+    connection = HTTPConnection(
+        parts.hostname or "", parts.port, timeout=20, source_address=(source, 0)
+    )
     named = {name.replace("_", "-"): value for name, value in headers.items()}
     joined = "&".join(filter(None, [parts.query, query]))
     connection.request(method, f"{path}?{joined}", headers=named)

@@ -123,6 +123,20 @@ def test_another_address_comes_in_during_a_flood(live: LiveRun) -> None:
     assert live.stop.asked
 
 
+def test_strangers_that_were_answered_and_stay_leave_room(live: LiveRun) -> None:
+    page = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+    opened = []
+    with served(live) as url:
+        for number in range(MOST_OPEN):
+            opened.append(stranger(url, f"127.0.0.{2 + number // MOST_OF_ADDRESS}"))
+            opened[-1].sendall(page)
+            assert opened[-1].recv(64)
+        assert press(url, "stop")[0] == 200
+        for connection in opened:
+            connection.close()
+    assert live.stop.asked
+
+
 def test_a_run_goes_on_while_strangers_flood_its_page(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, views=2)
     with RealTimeRun(plan, tmp_path / "run") as run, served(run.live) as url:

@@ -289,7 +289,8 @@ def test_a_browser_that_does_not_listen_holds_nothing_up(
 
 
 def test_too_many_followers_leave_the_stop_alone(live: LiveRun, url: str) -> None:
-    followers = [connect(url, "/events") for _ in range(MOST_STREAMS)]
+    desks = [f"127.0.0.{2 + number // 20}" for number in range(MOST_STREAMS)]
+    followers = [connect(url, "/events", source=desk) for desk in desks]
     for follower in followers:
         assert follower.readline()
     assert ask(url, "/events")[0] == 503

@@ -32,6 +32,11 @@ def _message(path: Path, fault: OSError) -> str:
             f"{path}: no file descriptor is left to write it with ({fault.strerror}). Raise the"
             " limit (ulimit -n), or end what holds so many files and connections open"
         )
+    if isinstance(fault, FileNotFoundError):
+        return (
+            f"{fault.filename or path}: is not there any more; somebody moved or deleted {path}"
+            " while the run wrote it. Move it back to go on with it; what was logged is whole"
+        )
     return (
         f"{path}: the disk does not take it ({fault.strerror}). Free some space, or mend what"
         " keeps it from being written; what was logged before is whole"

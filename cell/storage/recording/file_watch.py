@@ -8,6 +8,7 @@ from pathlib import Path
 
 from cell.errors import DiskFailed
 from cell.storage.recording.frames import FrameRecord
+from cell.storage.recording.header import FILE_NAME as HEADER
 
 
 class FileWatch:
@@ -39,17 +40,20 @@ class FileWatch:
             self._pictures[picture] = picture.stat().st_size
 
     def check(self) -> None:
-        """Raise `DiskFailed` where the log, the pictures' folder or the last picture changed."""
+        """Raise `DiskFailed` where log, header, pictures or their folder are not as written."""
         status = _status(self._path)
         if status is None or (status.st_dev, status.st_ino) != self._inode:
-            raise _gone(self._path)
+            raise gone(self._path)
         if status.st_size != self._size:
             raise DiskFailed(
                 f"{self._path}: has {status.st_size} bytes where this run wrote {self._size}:"
                 " somebody else writes to it. Keep the recording for this run alone."
             )
+        header = self._path.parent / HEADER
+        if _status(header) is None:
+            raise gone(header)
         if self._images is not None and _inode(self._images) != self._folder:
-            raise _gone(self._images)
+            raise gone(self._images)
         if self._pictures:
             self._check_picture(next(reversed(self._pictures)))
 
@@ -62,7 +66,7 @@ class FileWatch:
     def _check_picture(self, picture: Path) -> None:
         status = _status(picture)
         if status is None or status.st_size != self._pictures[picture]:
-            raise _gone(picture)
+            raise gone(picture)
 
 
 def _status(path: Path) -> os.stat_result | None:
@@ -77,7 +81,8 @@ def _inode(path: Path) -> tuple[int, int] | None:
     return None if status is None else (status.st_dev, status.st_ino)
 
 
-def _gone(path: Path) -> DiskFailed:
+def gone(path: Path) -> DiskFailed:
+    """The error for a file of a recording that is no longer what was written."""
     return DiskFailed(
         f"{path}: was deleted, cut or replaced while the run wrote the recording; frames of it are"
         " lost. Keep other programs away from the folder, and record anew with another -o."

@@ -22,13 +22,14 @@ from starlette.responses import (
 from starlette.routing import Route
 
 from cell.views.page.address import Address
-from cell.views.page.live_run import LiveRun
+from cell.views.page.live_run import LiveRun, Part
 from cell.views.page.picture import jpeg
 
 OWN_HEADER = "x-cell-page"
 """A page of elsewhere cannot set it without asking first, and is never answered."""
 
-MOST_STREAMS = 16
+MOST_STREAMS = 64
+"""Of the connections that the page has; what is left is for the buttons."""
 _TICK_S = 0.2
 
 
@@ -56,6 +57,7 @@ class Page:
         self._live, self._address = live, address
         self._html, self._policy = _document()
         self._encoded: tuple[int, bytes] = (0, b"")
+        self._events_encoded: dict[str, tuple[int, str]] = {}
 
     def application(self) -> Starlette:
         """The routes, each behind `_let_in`."""
@@ -143,8 +145,16 @@ class Page:
         parts = dict(self._live.parts)
         new = {name: p for name, p in parts.items() if sent.get(name) != p.version}
         sent.update({name: part.version for name, part in new.items()})
-        reported = [_event(name, part.content) for name, part in new.items()]
+        reported = [self._event(name, part) for name, part in new.items()]
         return "".join([*reported, _event("now", self._live.now())])
+
+    def _event(self, name: str, part: Part) -> str:
+        """A part as it is sent; encoded once, however many follow."""
+        version, text = self._events_encoded.get(name, (-1, ""))
+        if version != part.version:
+            text = _event(name, part.content)
+            self._events_encoded[name] = part.version, text
+        return text
 
     # -- what is asked ---------------------------------------------------------------------------
 

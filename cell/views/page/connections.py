@@ -3,7 +3,8 @@
 Strangers may open connections faster than anybody can answer, send half a request, or read nothing.
 Descriptors are what arm, camera and recording need too; so there is a cap on connections, per
 address and in all, a rate at which an address may open new ones, and a time for a request to be
-whole and for an answer to be taken. Whoever was answered once is not pushed out by who was not.
+whole and for an answer to be taken. Whoever was answered once is not pushed out by who was not; but
+one that stays in and asks nothing makes room where none is left, beginning with whoever has most.
 """
 
 from __future__ import annotations
@@ -77,6 +78,11 @@ class GuardedProtocol(H11Protocol):
     @property
     def _whole(self) -> bool:
         return self.cycle is not None and not self.cycle.more_body
+
+    @property
+    def idle(self) -> bool:
+        """Whether it was answered and asks nothing now; a browser opens another when it does."""
+        return self.served and self.cycle is not None and bool(self.cycle.response_complete)
 
     @property
     def address(self) -> str:
@@ -186,11 +192,17 @@ class Door:
         return self._push_out([protocol for protocol in held if protocol.address == most])
 
     def _push_out(self, held: Iterable[GuardedProtocol]) -> bool:
-        """Close the one that has waited longest without an answer; False where all have one."""
+        """Close the one that has waited longest without an answer, or else one that is idle.
+
+        False where all are being answered.
+        """
+        held = list(held)
         waiting = [p for p in held if not p.served and p.waits_since_s is not None]
-        if not waiting:
+        idle = [p for p in held if p.idle]
+        if not waiting and not idle:
             return False
-        min(waiting, key=lambda p: p.waits_since_s or 0.0).transport.abort()
+        out = min(waiting, key=lambda p: p.waits_since_s or 0.0) if waiting else idle[0]
+        out.transport.abort()
         return True
 
 
