@@ -3,7 +3,7 @@
     python benchmarks/bootstrap.py --seeds 20               # corners without pictures
     python benchmarks/bootstrap.py --seeds 20 --pictures    # whole dry runs
 
-Tells how many ended with a plan, how far off hand-eye is, whether each planned view has the whole
+Prints how many ended with a plan, how far off hand-eye is, whether each planned view has the whole
 board in the true camera's picture, and whether any move broke a true box or left the start.
 """
 
@@ -69,7 +69,7 @@ def _line(trial: Trial) -> str:
     if trial.found is not None:
         off_m, off_rad = trial.mounted_error()
         parts.append(
-            f"hand-eye {1e3 * off_m:.2f} mm {np.degrees(off_rad):.3f} deg off (said"
+            f"hand-eye {1e3 * off_m:.2f} mm {np.degrees(off_rad):.3f} deg off (stated"
             f" {1e3 * trial.found.mounted_sigma_m.max():.2f}), alpha {trial.found.alpha_px:.0f}"
         )
         if not trial.error:

@@ -1,4 +1,4 @@
-"""Does the joint fit's uncertainty tell the truth, and how near does it come to it?
+"""Does the joint fit's uncertainty hold, and how near does it come to it?
 
     python benchmarks/coverage.py [RUNS] [PROCESSES] [RESULTS.jsonl]
 
@@ -169,7 +169,7 @@ def pulls(fit: JointFit, true: CellModel) -> dict[str, list[float]]:
 
 
 def pulls_in_use(fit: JointFit, true: CellModel, views: Views) -> dict[str, list[float]]:
-    """Errors in pixels and at the work piece in units of what is told."""
+    """Errors in pixels and at the work piece in units of the stated sigma."""
     name = "flange_from_mounted" if views.mount == "eye_in_hand" else "base_from_fixed"
     found_from_true = rigid.inverse(getattr(fit.model, name)) @ getattr(true, name)
     back = rigid.inverse(found_from_true)

@@ -1,4 +1,4 @@
-"""How often does cross-validation cry out, where nothing is wrong and where something is?
+"""How often does cross-validation raise its flag, where nothing is wrong and where something is?
 
     python benchmarks/cross_validation.py [RUNS] [PROCESSES]
 
@@ -12,7 +12,7 @@ The simulated cells of `coverage.py` (20 parallel and 30 tilted views, corner no
   that errs with the light), beside the noise;
 - half: the robot's scatter is taken for half of what it is.
 
-Told are the verdicts, the factor by which the worst quantity's sigma is called too small (median),
+Printed: the verdicts, the factor by which the worst quantity's sigma is called too small (median),
 and by how much sigmas are: error over sigma of all numbers, RMS over the runs.
 """
 
@@ -45,7 +45,7 @@ CASES = ("nothing", "15 frames", "slip", "one frame", "bent", "half")
 
 @dataclass(frozen=True)
 class Run:
-    """What one run was told."""
+    """What one run reported."""
 
     case: str
     verdict: str

@@ -1,8 +1,8 @@
 """What `cell import` recovers from each layout of poses: the focal length and the hand-eye.
 
 One simulated cell, its corners as pictures would give them; its poses written in every layout that
-the tests know, read back with nothing said but what the layout needs, calibrated, and compared with
-the truth::
+the tests know, read back with nothing stated but what the layout needs, calibrated, and compared
+with the truth::
 
     python -m benchmarks.import_layouts > import_layouts.md
 """

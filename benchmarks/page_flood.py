@@ -6,7 +6,7 @@ it presses Stop during the flood, over the connection that a tablet has and over
 address of its own. Printed: seconds of each pair and their ratio, the median of the ratios and
 their spread, and the time from the press until the run's stop flag was set. It takes about two
 minutes, and needs a computer that does nothing else, or a raised priority (`nice -n -10`): each
-pair tells the load that it met.
+pair reports the load that it met.
 """
 
 from __future__ import annotations

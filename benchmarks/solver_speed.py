@@ -5,7 +5,7 @@
 Camera 4096 x 3072, alpha 4750 px, k1 k2 p1 p2, 14 x 14 corners, noise 0.1 px, 0.35 to 1 m, tilts 0
 to 45 degrees. CPU seconds are user and system time of all threads, the least of the repeats, after
 one small fit that loads what is compiled. Ours and OpenCV (with `CALIB_USE_LU`) find their own
-start; COLMAP and mrcal are given ours, whose time is told by itself.
+start; COLMAP and mrcal are given ours, whose time is a row of its own.
 mrcal is asked in `.mrcal` (see `tools/install-mrcal`); a peer that is missing is left out.
 Every fit runs in a process of its own, which loads no more than its work needs. Memory is that
 process's greatest resident set, what it held before it had any data, and how much of it were pages
@@ -56,7 +56,7 @@ def fitted(corners: FloatArray, row: FloatArray, poses: FloatArray) -> FloatArra
 
 
 def memory_mb(what: str) -> float:
-    """What the kernel tells of this process's memory: `VmHWM` is the greatest resident set."""
+    """What the kernel reports of this process's memory: `VmHWM` is the greatest resident set."""
     # getrusage would count what the parent held when it forked
     status = Path("/proc/self/status").read_text(encoding="ascii")
     return int(status.split(f"{what}:")[1].split()[0]) / 1024

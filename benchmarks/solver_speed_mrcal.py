@@ -39,7 +39,7 @@ def solve(data):
 
 
 def memory_mb(what):
-    """What the kernel tells of this process's memory."""
+    """What the kernel reports of this process's memory."""
     # getrusage would count what the parent held when it forked
     status = Path("/proc/self/status").read_text(encoding="ascii")
     return int(status.split(f"{what}:")[1].split()[0]) / 1024

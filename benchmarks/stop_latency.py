@@ -2,7 +2,7 @@
 
 ``python benchmarks/stop_latency.py [TIMES]`` runs a simulated cell in real time (its pictures are
 rendered, its corners searched, a browser follows the page) and stops it at a random instant: in
-turn by a POST over a new connection, and by SIGINT. Told is the time until `Arm.stop` is called.
+turn by a POST over a new connection, and by SIGINT. The time runs until `Arm.stop` is called.
 """
 
 from __future__ import annotations

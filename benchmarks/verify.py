@@ -1,4 +1,4 @@
-"""How often `cell verify` is right: false alarms where nothing changed, and what it tells else.
+"""How often `cell verify` is right: false alarms where nothing changed, and what else it reports.
 
     python benchmarks/verify.py [RUNS] [PROCESSES] [PLAN...]
 
@@ -46,7 +46,7 @@ CASES = {
 
 
 def changed(cell: SimulatedCell, case: str) -> SimulatedCell:
-    """The cell after what the case tells."""
+    """The cell after what the case states."""
     model, knock, more = cell.model, np.zeros(6), 0.0
     if "0.3 mm" in case:
         knock = np.array([2e-4, -1e-4, 2e-4, 0.0, 3e-4, 0.0])
@@ -88,7 +88,7 @@ def one_run(job: tuple[str, int]) -> list[tuple[str, str, Judgement, bool]]:
 
 
 def main(runs: int = 50, processes: int = 2, *plans: str) -> None:
-    """Print what was told, by plan and case."""
+    """Print what was reported, by plan and case."""
     jobs = [(name, seed) for name in plans or PLANS for seed in range(1, runs + 1)]
     reported = []
     with Pool(processes) as pool:
@@ -104,7 +104,7 @@ def main(runs: int = 50, processes: int = 2, *plans: str) -> None:
             others = ", ".join(f"{n} {v}" for v, n in verdicts.items() if v != right)
             print(
                 f"  {case:24} {right}: {verdicts[right]}/{len(rows)}"
-                f"{'; else ' + others if others else ''}; board told rightly {board}/{len(rows)}"
+                f"{'; else ' + others if others else ''}; board right {board}/{len(rows)}"
             )
         null = sorted(j.p_value for plan, c, j, _ in reported if plan == name and c == "nothing")
         arm = [j.arm_ratio for plan, c, j, _ in reported if plan == name and c == "nothing"]

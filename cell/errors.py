@@ -24,7 +24,7 @@ EXIT_SAFETY = 5
 
 
 class CellError(Exception):
-    """Anything the operator is told in words, never as a traceback."""
+    """Anything the operator gets as a message, never as a traceback."""
 
     exit_status = EXIT_BAD_ANSWER
 

@@ -28,13 +28,13 @@ class ArmState:
     controller_t_s:
         The controller's own clock, seconds; None where it has none.
     joints_rad, joint_velocity_rad_s:
-        Six joint angles and speeds; None where the controller does not tell.
+        Six joint angles and speeds; None where the controller does not report.
     base_from_flange:
         Pose of the tool flange in the robot base, never of the TCP.
     motion:
         See `Motion`.
     fault:
-        None, or what stopped the arm, in words for the operator.
+        None, or what stopped the arm, as text for the operator.
     raw:
         Values as the controller sent them, for the log.
     """

@@ -9,7 +9,7 @@ _CHUNK_BYTES = 1 << 16
 
 
 class NoAnswer(Exception):
-    """Nothing that can be used came; the message is in words of ours, without the other's bytes.
+    """Nothing that can be used came; the message is our own, without the other's bytes.
 
     Attributes
     ----------

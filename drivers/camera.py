@@ -31,7 +31,7 @@ class Frame:
     device_t_s:
         The camera's own clock, seconds, or None.
     exposure_s, gain_db, focus_position, focus_distance_m, temperature_c:
-        As read back from the camera; None where it does not tell.
+        As read back from the camera; None where it does not say.
     raw:
         Further values to log.
     """

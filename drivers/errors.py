@@ -8,7 +8,7 @@
     ├── FrameMissing               no whole frame came; the next trigger may succeed
     └── ArmStopped              the arm stopped by itself: protective stop, emergency stop, fault
     SafetyError                 a limit of ours refused or stopped a motion   exit status 5
-    └── StopFailed              the arm was told to stop and did not confirm it
+    └── StopFailed              the arm was ordered to stop and did not confirm it
 
 Every message says what happened, on which device, and what the operator can do.
 """
@@ -41,4 +41,4 @@ class SafetyError(Exception):
 
 
 class StopFailed(SafetyError):
-    """The arm was told to stop and did not confirm it. The loudest error there is."""
+    """The arm was ordered to stop and did not confirm it. The loudest error there is."""

@@ -64,7 +64,7 @@ class FocusControl:
         return self._features.has(self._names.position)
 
     def position(self) -> float | None:
-        """The position read from the camera, in its own steps, or None where it tells none."""
+        """The position read from the camera, in its own steps, or None where it states none."""
         return float(self._features.read(self._names.position)) if self.available else None
 
     def set(self, setting: FocusSetting) -> float | None:

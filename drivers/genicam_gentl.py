@@ -138,7 +138,7 @@ class GenTLSession:
 
     @property
     def lost(self) -> bool:
-        """GenTL tells of a loss only when the camera is asked."""
+        """GenTL reports a loss only when the camera is asked."""
         return False
 
     def note_incomplete(self) -> None:

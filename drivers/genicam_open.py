@@ -243,4 +243,4 @@ class OpenCamera:
         exposure_s = self.values.get("exposure_s", 0.0)
         if self._options.software_trigger:
             return (taken.sent_s + taken.acknowledged_s + exposure_s) / 2
-        return taken.arrived_s - exposure_s / 2  # late by the transfer, which nobody tells
+        return taken.arrived_s - exposure_s / 2  # late by the transfer, which nobody states

@@ -31,7 +31,7 @@ class Features(Protocol):
 
 @dataclass(frozen=True)
 class RawFrame:
-    """A whole frame as it came: its own copy of the samples, and what the transport tells of it."""
+    """A whole frame as it came: its own copy of the samples, and what the transport reports."""
 
     data: bytes
     width: int

@@ -83,7 +83,7 @@ class RobotiqCamera:
         return self._ask(lambda end: self._configure(exposure_s, gain_db, end), _SETTING_S, "set")
 
     def focus(self, setting: FocusSetting) -> float | None:
-        """Focus and lock; None where the firmware does not tell, and then nothing is locked."""
+        """Focus and lock; None where the firmware does not report, and then nothing is locked."""
         return self._ask(lambda end: self._focus(setting, end), 2 * _SETTING_S, "focus")
 
     def grab(self, timeout_s: float) -> Frame:

@@ -49,7 +49,7 @@ class RobotiqHttp:
         return body
 
     def settings(self, deadline_s: float) -> dict[str, Any] | None:
-        """The camera's settings by name, or None where this firmware does not tell them."""
+        """The camera's settings by name, or None where this firmware does not report them."""
         try:
             body = self._request("GET", "/getcamerasettings", None, deadline_s)
             settings = json.loads(body)["cameraSettings"]

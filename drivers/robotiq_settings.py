@@ -40,7 +40,7 @@ class RobotiqSettings:
         self._locked_at: float | None = None
 
     def probe(self, deadline_s: float) -> None:
-        """Find out whether this firmware tells its settings; if so, autos off."""
+        """Find out whether this firmware reports its settings; if so, autos off."""
         settings = self._http.settings(deadline_s)
         self.supported = settings is not None
         if settings:
@@ -48,7 +48,7 @@ class RobotiqSettings:
             self._change({name: False for name in _AUTOS if name in settings}, deadline_s)
 
     def read(self, deadline_s: float) -> Settings:
-        """All settings as the camera tells them; empty where it tells none.
+        """All settings as the camera reports them; empty where it states none.
 
         Raises
         ------
@@ -153,7 +153,7 @@ def _checked(settings: Settings) -> Settings:
 
 
 def values_of(settings: Settings) -> dict[str, float]:
-    """`exposure_s` and `gain_db` of raw settings; a key is absent where they do not tell."""
+    """`exposure_s` and `gain_db` of raw settings; a key is absent where they do not say."""
     values = {}
     if "exposure" in settings:
         values["exposure_s"] = settings["exposure"] * 1e-6

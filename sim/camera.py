@@ -27,7 +27,7 @@ _GAIN_RANGE_DB = (0.0, 24.0)
 
 
 class KnowsItsTruth(Protocol):
-    """An arm that tells the world where it is; `SimArm` does."""
+    """An arm that reports where it is; `SimArm` does."""
 
     def truth(self) -> ArmTruth:
         """Joints now, and by how much the flange misses the reported pose."""
@@ -155,7 +155,7 @@ class SimCamera:
         connected_s:
             When the interrupted run connected, on the clock.
         focus_m:
-            Where the lens stood focused, or None where nothing tells.
+            Where the lens stood focused, or None where nothing states.
         """
         self._connected_s = connected_s
         self._focus_distance_m = self._focus_distance_m if focus_m is None else focus_m

@@ -24,7 +24,7 @@ class CameraSpec:
     Attributes
     ----------
     width_px, height_px, pixel_size_m:
-        The sensor; the pixel's side is None where the maker does not tell.
+        The sensor; the pixel's side is None where the maker does not say.
     focus:
         `auto` and `motorised` lenses focus on command; `manual` and `fixed` ones refuse.
     focal_length_m, f_number:

@@ -63,7 +63,7 @@ def synthesize_corners(
     arm_rng, corner_rng:
         Where the scatter comes from.
     log_focus:
-        Whether the camera tells what distance it is focused at.
+        Whether the camera reports what distance it is focused at.
     """
     errors = repeatability.draw(arm_rng, (len(log),))
     state = evaluate(model, log, flange_error=errors)

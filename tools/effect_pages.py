@@ -96,7 +96,7 @@ def _rivals(effect: Effect) -> str:
 
 
 def _rival(effect: Effect, rival: Effect) -> str:
-    return f"- [`{rival.name}`]({rival.name}.md). To tell them apart: {experiment(effect, rival)}."
+    return f"- [`{rival.name}`]({rival.name}.md). To distinguish them: {experiment(effect, rival)}."
 
 
 def _command(effect: Effect) -> str:

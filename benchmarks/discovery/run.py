@@ -1,4 +1,4 @@
-"""Conceal recordings, diagnose them, and count what was told: the table of docs/discovery.md.
+"""Conceal recordings, diagnose them, and count what was reported: the table of docs/discovery.md.
 
     python -m benchmarks.discovery.run [--clean N] [--catalogue N] [--outside N] [--faults N]
                                        [--hidden N] [--results FILE.jsonl]
@@ -46,7 +46,7 @@ _NAMELESS = ("outside", "hidden")
 """Kinds of which `unexplained` is right."""
 
 _FOUND_IN_LOG = (("optics_step",),)
-"""Told by the search of the log, whatever the catalogue has."""
+"""Found by the search of the log, whatever the catalogue has."""
 
 
 @dataclass(frozen=True)

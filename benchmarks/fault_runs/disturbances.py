@@ -1,10 +1,10 @@
-"""An arm that does something else than it was told, in whole runs through the drivers, as a table.
+"""An arm that does not do as ordered, in whole runs through the drivers, as a table.
 
     python -m benchmarks.fault_runs.disturbances [--stand ur+gige] [--only WORDS] [--instants 10]
 
 Each trial is a `cell run` in a process of its own, against peers. Where the arm stands, it is
 pushed or sags; on its way, the controller takes another one, or drives faster than ordered. Nobody
-tells the run; only its readings do. It must end with exit status 5 and say which of these it was,
+reports it to the run; only readings do. It must end with exit status 5 and say which it was,
 and the arm must stand. Times are from the push, or from the first motion of the move that is wrong.
 """
 
@@ -44,7 +44,7 @@ class Disturbance:
     name:
         In the table.
     pattern:
-        Pattern of what the operator must be told.
+        Pattern of what the operator must be shown.
     prepare:
         Makes the controller ready for it.
     push:
@@ -103,9 +103,9 @@ def complaints(kind: Disturbance, trial: StopTrial) -> list[str]:
     if trial.exit_status != _SAFETY:
         found.append(f"exit status {trial.exit_status}, not {_SAFETY}")
     if re.search(kind.pattern, trial.output) is None:
-        found.append(f"the operator is not told '{kind.pattern}'")
+        found.append(f"operator does not see '{kind.pattern}'")
     if kind.stands and trial.moving:
-        found.append("the arm moved when the run said what became of it")
+        found.append("the arm moved when the run reported what became of it")
     if "Traceback" in trial.output:
         found.append("a traceback")
     return found
@@ -187,7 +187,7 @@ def main() -> None:
         (
             "cell",
             "the arm",
-            "stopped and told",
+            "stopped and reported",
             "stop order, worst",
             "halt, worst",
             "word, worst",

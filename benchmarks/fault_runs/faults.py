@@ -45,7 +45,7 @@ class Fault:
     exits:
         The exit statuses that the contract has for it.
     patterns:
-        Patterns of what the operator must be told: what happened, what to do.
+        Patterns of what the operator must be shown: what happened, what to do.
     halt_s:
         The longest that the arm may move on after it; None where it may until the run's end.
     survived:

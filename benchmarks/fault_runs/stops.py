@@ -4,7 +4,7 @@
 
 Each trial is a `cell run` in a process of its own. While the arm is on a slow move, the controller
 is given its fault and the run a Ctrl-C. What comes of it is held against the simulated arm itself:
-a stop is told as done (exit status 4) only where the arm stands, and confirmed wherever there are
+a stop counts as done (exit status 4) only where the arm stands, and confirmed wherever there are
 true readings of it; in all other cases the alarm is raised and the status is 5.
 """
 
@@ -54,11 +54,11 @@ class Kind:
     arrives:
         Whether orders reach it at all.
     confirmed:
-        Makers of the arms whose true readings tell of the stop, so that it must be confirmed.
+        Makers of the arms whose true readings show the stop, so that it must be confirmed.
     either:
         Makers of the arms with which it may be confirmed by something else that is true.
     alarm:
-        What the operator is told where it was not, or did not last.
+        What the operator is informed where it was not, or did not last.
     """
 
     name: str
@@ -86,9 +86,9 @@ KINDS = (
         either=_ALL,
         alarm="moved again after it had been stopped",
     ),
-    # Robot Web Services tell no clock that could stand still
+    # Robot Web Services report no clock that could stand still
     Kind("frozen clock", {"frozen_clock": True}, confirmed=(ABB,)),
-    # joints that never change are told from an arm at rest only by the way it must have gone
+    # joints that never change differ from an arm at rest only by the way it must have gone
     # since; where they are as new as the order, RAPID's having stopped is what confirms it
     Kind("old readings", {"old_readings": True}, either=(ABB,)),
 )
@@ -104,7 +104,7 @@ class StopTrial:
         To the first order at the controller, to the arm's halt (both None where there was none
         while the run lasted), and to the word of it.
     moving:
-        Whether the arm moved when the word was said.
+        Whether the arm moved when the report came.
     """
 
     order_s: float | None
@@ -118,7 +118,7 @@ class StopTrial:
         """What was not as it must be."""
         found = []
         if self.exit_status == _STOPPED and self.moving:
-            found.append("told as stopped while it moved")
+            found.append("reported as stopped while it moved")
         wanted = _STOPPED if maker in kind.confirmed else _ALARM
         if maker in kind.either and self.exit_status == _STOPPED:
             wanted = _STOPPED
@@ -265,7 +265,7 @@ def main() -> None:
         (
             "cell",
             "the stop is",
-            "told as it was",
+            "reported as it was",
             "confirmed",
             "order at the controller, worst",
             "halt, worst",

@@ -54,7 +54,7 @@ class Trial:
     frames:
         In the recording afterwards.
     output:
-        All that the run said.
+        All that the run printed.
     complaints:
         What was not as it must be.
     """
@@ -76,7 +76,7 @@ class Trial:
 def happening(stand: Stand, folder: Path, fault: Fault, instant_s: float) -> Trial | None:
     """`trial`, again where a busy machine ended the run before the fault did.
 
-    None where it did so every time; all that can be said of the fault then is that the arm stood
+    None where it did so every time; all that is known of the fault then is that the arm stood
     and the recording was whole.
     """
     for _ in range(_TRIES):

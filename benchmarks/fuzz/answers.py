@@ -14,7 +14,7 @@ _WAIT_S = 0.2
 class Talk(Enum):
     """When the bytes are sent: at once; after a question; the first line at once, others after."""
 
-    TELLS, ANSWERS, GREETS = range(3)
+    BROADCASTS, ANSWERS, GREETS = range(3)
 
 
 @contextmanager
@@ -41,7 +41,7 @@ def _serve(server: socket.socket, data: bytes, talk: Talk) -> None:
             link.settimeout(_WAIT_S)
             greeting = data[: data.find(b"\n") + 1] if talk is Talk.GREETS else b""
             link.sendall(greeting)
-            if talk is not Talk.TELLS:
+            if talk is not Talk.BROADCASTS:
                 link.recv(65536)
             link.sendall(data[len(greeting) :])
             link.shutdown(socket.SHUT_WR)

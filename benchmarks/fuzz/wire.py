@@ -34,7 +34,7 @@ from sim.peers.loopback import own_address
 
 _TURN_RAD, _WAIT_S = 3.2, 0.5
 _TYPE = "TYPE"
-"""Where RWS 1.0 names what it tells."""
+"""Where RWS 1.0 names what it reports."""
 _UNUSED_AXIS = "8.999999488E9"
 
 
@@ -65,7 +65,7 @@ def _universal_robots() -> Iterator[Kind]:
     yield Kind(
         "UR primary port",
         (_kinematics(),),
-        _at((address, PRIMARY_PORT), lambda _: read_kinematics(address, _WAIT_S), Talk.TELLS),
+        _at((address, PRIMARY_PORT), lambda _: read_kinematics(address, _WAIT_S), Talk.BROADCASTS),
     )
     reported = {"info": {"version": "5.0.107"}, "mode": "RUNNING", "marketingVersion": "10.14"}
     yield Kind(

@@ -39,7 +39,7 @@ with joint 3 near its upper limit; wrist 1 and wrist 3 of ABB's are one inside t
 
 _THICK = 0.15
 """Radius of an arm's links as a share of its upper arm or forearm, whichever is longer, where no
-description tells: the widest of the known arms has 0.14."""
+description states: the widest of the known arms has 0.14."""
 
 
 def arm_bodies(arm: ArmKinematics) -> tuple[tuple[Body, ...], str]:

@@ -103,7 +103,7 @@ class Scene:
     Bodies on one link, on neighbouring links, and two that stand are not held against each other;
     neither is what stands against the arm's foot and first link. Two bodies at most two links
     apart that are nearer than `clearance_m` in most positions (within the limits) of the joints
-    between them are built so near to each other that shapes with a margin cannot tell them
+    between them are built so near to each other that shapes with a margin cannot separate them
     apart; they are left out too (`built_together`).
     """
 

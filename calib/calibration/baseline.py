@@ -21,7 +21,7 @@ FRAME_OUTLIER = 6.0
 """A frame this many times worse than the median one is a wrong detection."""
 
 _ROUNDS = 8
-"""Wrong corners bend the fit that tells them: it is repeated until it leaves out the same."""
+"""Wrong corners bend the fit that finds them: it is repeated until it leaves out the same."""
 
 CORNER_OUTLIER = 8.0
 _LONGEST_LENS = 25.0
@@ -38,7 +38,7 @@ class Baseline:
     Attributes
     ----------
     algebraic:
-        None where the closed form has no solution; `missing` tells why.
+        None where the closed form has no solution; `missing` says why.
     mle:
         Maximum likelihood.
     used:

@@ -15,7 +15,7 @@ class Caution:
     Attributes
     ----------
     what, where, remedy:
-        In words: what is wrong, in which frames or files, what to do.
+        As text: what is wrong, in which frames or files, what to do.
     undetermined:
         Parts of the answer that the data do not determine.
     """

@@ -60,7 +60,7 @@ def _camera(views: Views, solutions: Mapping[str, Solution]) -> Iterator[Caution
         return
     yield Caution(
         f"the focal length is not determined ({alpha:.0f} px, one sigma {sigma:.0f} px): the board"
-        " is seen at too few different tilts, and focal length and distance cannot be told apart",
+        " is seen at too few different tilts, and focal length and distance cannot be separated",
         f"all {int(np.isfinite(best.residual_px).any(axis=(1, 2)).sum())} frames used",
         "add views with the board tilted by 20 to 45 degrees about both of its axes, nearer and"
         " farther; `cell plan` chooses them",

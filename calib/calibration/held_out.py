@@ -39,7 +39,7 @@ class ChiSquare:
 
     @property
     def each(self) -> float:
-        """Per degree of freedom: one where all that is said of the uncertainty is true."""
+        """Per degree of freedom: one where the stated uncertainty is true."""
         return self.total / self.freedom
 
     @property

@@ -2,7 +2,7 @@
 
 Hand-eye judges a logged pose by the pose that one constant camera gives to the picture. Where the
 lens moves, that pose is off by centimetres at the ends of the range, and a good frame there looks
-like a slip of the log. The joint fit, whose lens may move, judges it again.
+like a mix-up of the log. The joint fit, whose lens may move, judges it again.
 """
 
 from __future__ import annotations

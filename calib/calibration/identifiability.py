@@ -41,7 +41,7 @@ class Weakness:
     inflation:
         How many times worse the combination is known than its members would be, each alone.
     views:
-        What to record besides, in words.
+        What to record besides, as text.
     gain:
         By what factor those views would lower its uncertainty.
     """

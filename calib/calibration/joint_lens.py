@@ -93,7 +93,7 @@ class _Pictures:
 
 
 def deserved_terms(joint: JointFit, views: Views) -> tuple[str, ...]:
-    """The groups that lower the Bayesian information criterion, the most telling first.
+    """The groups that lower the Bayesian information criterion, the most informative first.
 
     A group that other programs rarely have must earn its price in frames held out, and a tenth of
     their square sum: on recordings at hand the criterion alone bought terms of absurd size, since

@@ -205,7 +205,7 @@ def _held(
 
 
 def _confirmed(choice: FocusLawChoice, reference: RobotReference) -> FocusLawChoice:
-    """Ask the joint fit of pictures and robot where the scale factors alone are a poor witness.
+    """Ask the joint fit of pictures and robot where the scale factors alone are poor evidence.
 
     They inherit every error of the arm's distances. So a lens that the joint fit knows to stand
     still is taken to stand still, and between two laws that fit alike its choice counts.

@@ -20,7 +20,7 @@ def quantities_of(
 ) -> dict[str, FloatArray]:
     """(r, p) by name: how a quantity's r numbers follow the p that were fitted.
 
-    Focal length and depth (where the robot is told a part is, along the axis) are asked for at
+    Focal length and depth (where a part is for the robot, along the axis) are asked for at
     the nearest and the farthest distance, in the image's middle; a focal length that stands still
     once. Where the board's middle is seen from a logged pose is the mean over the views.
     """

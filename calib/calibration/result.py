@@ -96,7 +96,7 @@ class Solution:
     values:
         The numbers of `VALUES`, and further distortion terms that the fit freed (`p1`, `p2`, `k3`).
     focus:
-        How alpha and beta move with distance where this solution's own fit tells, else None.
+        How alpha and beta move with distance where this fit determines it itself, else None.
     covariance:
         Of the numbers that were fitted together, or None.
     """

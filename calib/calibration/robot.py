@@ -133,7 +133,7 @@ def hand_eye_of(views: Views, used: BoolArray, camera_from_board: FloatArray) ->
 
 
 def _plausible(joint: JointFit, plain: CellModel) -> bool:
-    """Whether the joint fit stayed near the pictures' own answer, whatever the robot said."""
+    """Whether the joint fit stayed near the pictures' own answer, whatever the robot's ask."""
     alpha = COLUMN["alpha_px"]
     ratio = joint.model.optics[alpha] / plain.optics[alpha]
     return 1 / _ALPHA_RANGE < ratio < _ALPHA_RANGE and _is_covariance(joint.covariance)

@@ -1,7 +1,7 @@
 """A cell that is only roughly known: the guess is a prior of the joint fit of its first few views.
 
 One view already ties the fixed part to the mounted one; every further view narrows both, and the
-lens. What is not known yet keeps the width it was told with, so that the covariance of even one
+lens. What is not known yet keeps the width it was given with, so that the covariance of even one
 view says honestly where the board may appear next.
 """
 
@@ -30,7 +30,7 @@ _BREATHING_SHARE = 0.03
 """Of the scale factor at the first view's distance: thin lenses and the paper's reach that."""
 
 _USUAL_NOISE = Noise(corner_px=0.5, flange_m=5e-4, flange_rad=5e-4)
-"""Until the frames can tell: a lens with terms of its own, an arm that was never calibrated."""
+"""Until the frames can show: a lens with terms of its own, an arm that was never calibrated."""
 
 FRAMES_FOR_NOISE = 8
 _STEP_SIGMA = 0.3
@@ -85,7 +85,7 @@ def guess_from_one_view(
     views:
         The first has corners and a pose.
     flange_from_mounted, alpha_px:
-        (4, 4) and the scale factor, as told.
+        (4, 4) and the scale factor, as stated.
     refocuses:
         Whether the lens moves to focus; its focal length then follows the distance.
 

@@ -151,7 +151,7 @@ def focal_length_change_px(joint: Estimate, views: Views, distance_m: FloatArray
 def workpiece_sigma_m(
     joint: Estimate, views: Views, pixels_px: FloatArray, distance_m: FloatArray
 ) -> FloatArray:
-    """How far off the robot may be told a part is that one perfect picture locates.
+    """How far off a part may be for the robot that one perfect picture locates.
 
     The part lies square to the optical axis and is found by least squares in pixels; then the
     camera's place brings it to the robot.
@@ -222,7 +222,7 @@ def _change_of_pixels(joint: Estimate, shown: Views) -> FloatArray:
 def _change(
     joint: Estimate, quantity: Callable[[CellModel], FloatArray], by: BoolArray
 ) -> FloatArray:
-    """(..., p) of what a cell tells, by those of the p numbers; central differences."""
+    """(..., p) of what a cell implies, by those of the p numbers; central differences."""
     sigma = np.sqrt(np.diag(joint.covariance))
     change = np.zeros((*quantity(joint.model).shape, len(sigma)))
     for k in np.flatnonzero(by):

@@ -19,7 +19,7 @@ class Covariate:
     Attributes
     ----------
     name, unit:
-        As told to the reader.
+        As shown to the reader.
     of:
         (N,) or (N, D) values from the state; NaN where not known.
     cyclic:

@@ -1,4 +1,4 @@
-"""What an effect is: one departure from the plain chain, said in one small file of its own."""
+"""What an effect is: one departure from the plain chain, described in one small file of its own."""
 
 from __future__ import annotations
 

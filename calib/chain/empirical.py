@@ -241,7 +241,7 @@ def empirical(curve: Curve, functions: int) -> Effect:
 
 
 def empirical_from(law: str, given: Mapping[str, float]) -> Present:
-    """Return the curve that a file tells: law `site/covariate`, range, period, coefficients.
+    """Return the curve that a file states: law `site/covariate`, range, period, coefficients.
 
     Raises
     ------

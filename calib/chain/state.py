@@ -22,7 +22,7 @@ _FIELD_STEPS = 8
 
 @dataclass
 class ChainState:
-    """What the links have said so far about N frames.
+    """What the links have contributed so far about N frames.
 
     An effect may write into `optics`, `points_m` and `dh_offset`; every other array it replaces.
 

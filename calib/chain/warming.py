@@ -11,7 +11,7 @@ from calib.views import FloatArray, Views
 
 TIME_CONSTANT = Parameter("tau_s", "s", 900.0, 20.0, 2e4, role="shape")
 START = Parameter("start_s", "s", 0.0, -1e12, 1e12, role="setting")
-"""The log's clock when the machine was cold; other frames of the run are told by the same."""
+"""The log's clock when the machine was cold; other frames of a run are predicted with it."""
 
 
 def warmth(tau_s: float, start_s: float, views: Views) -> FloatArray:

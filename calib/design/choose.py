@@ -16,7 +16,7 @@ from calib.design.needs import Need
 from calib.views import FloatArray
 
 _RIDGE = 1e-10
-"""Of all candidates' information together: lets the first few views be told apart."""
+"""Of all candidates' information together: makes the first few views comparable."""
 
 _MOST_PASSES = 6
 

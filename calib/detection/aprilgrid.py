@@ -182,7 +182,7 @@ def _fitted(
         first = mended(fitted, doubt, expected if line is None else line)
     side_px = float(np.median(np.linalg.norm(np.diff(expected, axis=1)[:, ::2], axis=-1)))
     if float(np.median(fitted.parameters[~doubt][:, WIDTH])) > _BLURRED * clear * side_px:
-        return Rejected("too blurred to tell the corners from the tags' bits")
+        return Rejected("too blurred to distinguish the corners from the tags' bits")
     return fitted, doubt
 
 

@@ -39,7 +39,7 @@ _STRAY_SQUARES = 0.1
 _MOST_PASSES = 12
 _IN_LINE_PX = 0.01
 _SMALL_SQUARE_PX = 12
-_TOO_BLURRED = "too blurred to tell the corners from the markers"
+_TOO_BLURRED = "too blurred to distinguish the corners from the markers"
 _MARGIN_PX = 8
 
 
@@ -52,7 +52,7 @@ class Guess:
     corners_px:
         (rows, cols, 2) pixels.
     layout:
-        Which of the board's `layouts` it has, where the markers told.
+        Which of the board's `layouts` it has, where the markers show it.
     """
 
     corners_px: FloatArray

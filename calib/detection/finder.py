@@ -19,7 +19,7 @@ from calib.views import Board
 _MOST_PIECES = 3
 _PARTIAL = "partial view"
 _NOTHING = "no chessboard corners in the picture"
-# a fit at this scale tells the shading and the bend of the lines well enough
+# a fit at this scale finds the shading and the bend of the lines well enough
 _GOOD_ENOUGH_SCALE = 0.5
 
 

@@ -41,7 +41,7 @@ class Grid:
     def turned(self, quarters: int) -> Grid:
         """The same grid counted from another of its corners; never mirrored."""
         # every quarter turn brings a square of the other colour outside corner (0, 0) when the
-        # number of corners along the side it walks is odd
+        # number of corners along the side it runs along is odd
         corners, dark = self.corners_px, self.first_dark
         for _ in range(quarters % 4):
             dark ^= corners.shape[1] % 2 == 1

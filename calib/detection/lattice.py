@@ -53,7 +53,7 @@ def _turn(angle: float) -> float:
 def _nearest_along(xy: Any, rays: Any, near: Any, alignment: float) -> Any:
     """(K, 4) the nearest candidate along each ray whose own ray points back, or -1.
 
-    An edge has its dark side on the other hand when walked from the other end, so an even ray
+    An edge has its dark side on the other hand when followed from the other end, so an even ray
     can only meet an odd one.
     """
     K = xy.shape[0]

@@ -33,7 +33,7 @@ _EVEN = 0.03
 class Placement:
     """How a board lies on a grid: turned, then its corner (0, 0) at corner (row, col) of it.
 
-    `layout` tells which of `layouts` it has.
+    `layout` says which of `layouts` it has.
     """
 
     quarters: int
@@ -150,7 +150,7 @@ def _ranked(
 def place_by_markers(
     image: NDArray[np.float32], grid: Grid, board: Board, *, runner_up: float = 0.6
 ) -> Placement | None:
-    """How the board lies on a grid of corners, or None where the markers do not tell clearly.
+    """How the board lies on a grid of corners, or None where the markers do not show clearly.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Which end of a symmetric board is row 0: the same physical one in every frame.
 
-A board whose colours do not tell its ends apart is found up to a half turn (a square one with
+A board whose colours do not distinguish its ends is found up to a half turn (a square one with
 even rows up to a quarter turn). With the board fixed in the world (or to the flange), every
 frame says G_i X R_i Z^t_i = W: flange, mount, camera from board, t_i quarter turns, and the
 board in the base. Rotations between two frames have the same angle seen by the robot and by
@@ -38,7 +38,7 @@ def turned_order(board: Board, quarters: int) -> IntArray:
 
 
 def possible_turns(board: Board) -> tuple[int, ...]:
-    """Quarter turns that the board's colours do not tell apart."""
+    """Quarter turns that the board's colours do not distinguish."""
     if board.identified or (board.rows + board.cols) % 2:
         return (0,)
     return (0, 1, 2, 3) if board.rows == board.cols and board.rows % 2 == 0 else (0, 2)
@@ -164,7 +164,7 @@ def turns_to_agree(
     """(N,) quarter turns by which each frame's order must be turned so that all agree.
 
     For corners from anywhere (a recording that kept no pictures, say). Where the board's
-    colours tell its ends apart, all are zero. Otherwise the robot's poses decide; frames
+    colours distinguish its ends, all are zero. Otherwise the robot's poses decide; frames
     without one, and recordings with fewer than three, follow the least rotation from frame to
     frame. The first frame keeps its order. `turned_order` applies a turn.
 

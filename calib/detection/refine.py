@@ -281,7 +281,7 @@ def fit_closely(
 ) -> Fitted:
     """The last word on a grid: starts refined if `rough`, then the fit with all that bends.
 
-    Where the blur mixes neighbouring corners, a first fit tells more of the neighbours.
+    Where the blur mixes neighbouring corners, a first fit says more about the neighbours.
     """
     if rough:
         first = fit_grid(image, first, clear=clear, iterations=2).parameters

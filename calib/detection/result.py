@@ -45,7 +45,7 @@ class Detection:
     contrast:
         (M,) grey levels between the bright and the dark squares.
     upside_down_known:
-        Whether the picture alone tells which end of the board is row 0.
+        Whether the picture alone says which end of the board is row 0.
     saturated:
         Share of the bright pixels on the board that stand at the sensor's limit.
     """

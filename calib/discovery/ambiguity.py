@@ -1,4 +1,4 @@
-"""What these data cannot tell apart, and what would tell it."""
+"""What these data cannot distinguish, and what would."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ _GENERAL = "more views in which the two differ: the plan of `separate_with`, if 
 
 
 def experiment(first: Effect, second: Effect) -> str:
-    """What would tell the two apart, in words."""
+    """What would distinguish the two, as text."""
     return _EXPERIMENTS.get(frozenset({first.name, second.name}), _GENERAL)
 
 

@@ -41,7 +41,7 @@ class Mismatch:
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """One piece of physics, or slip of the log, that the recording demands."""
+    """One piece of physics, or mix-up in the log, that the recording demands."""
 
     name: str
     link: str
@@ -55,7 +55,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Ambiguity:
-    """Names that these data cannot tell apart, why, and what would."""
+    """Names that these data cannot distinguish, why, and what would."""
 
     names: tuple[str, ...]
     why: str
@@ -75,7 +75,7 @@ class FoundLaw:
     holdout_gain_px:
         How much worse the held-out frames are predicted without it; NaN where none were held out.
     rivals:
-        Other laws that these data do not rule out, in words.
+        Other laws that these data do not rule out, as text.
     """
 
     form: str
@@ -149,7 +149,7 @@ class Diagnosis(Shown):
             f"unexplained: {term.link}, along {term.covariate} ({term.where})"
             for term in self.unexplained_all
         ]
-        lines += [f"cannot be told apart: {' and '.join(a.names)}" for a in self.ambiguous_with]
+        lines += [f"cannot be distinguished: {' and '.join(a.names)}" for a in self.ambiguous_with]
         return tuple(lines)
 
     def rows(self) -> list[Row]:

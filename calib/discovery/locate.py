@@ -47,11 +47,11 @@ class Cell:
     curve:
         What to fit to carry it, or None for a field over image or board, or for a law.
     where:
-        Range of the covariate in which the misfit is largest, in words.
+        Range of the covariate in which the misfit is largest, as text.
     law:
         The law by which the site follows the covariate, where one was found.
     rivals:
-        Other laws that the data do not rule out, in words.
+        Other laws that the data do not rule out, as text.
     """
 
     site: str

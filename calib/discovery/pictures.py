@@ -10,7 +10,7 @@ from calib.views import FloatArray
 
 _FEWEST = 8
 _CLEAR = 10.0
-"""The blur must follow the distance with this much likelihood (in -2 log) to be told."""
+"""The blur must follow the distance with this much likelihood (in -2 log) to be reported."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ _GUESS = 1e-4
 
 @dataclass(frozen=True)
 class Scatter:
-    """By which share of itself the focal length scatters, and what to tell of it."""
+    """By which share of itself the focal length scatters, and what to report of it."""
 
     relative: float
     cell: Cell
@@ -38,7 +38,7 @@ def scattered(structure: ResidualStructure) -> Scatter | None:
     """How the focal length scatters in the best cell that was found; None where it does not.
 
     A field of shifts that is left in the pictures bends poses along the axis, too: beside one
-    nothing can be said.
+    nothing can be concluded.
     """
     search = structure.search
     in_pictures = any(cell.is_field for cell in structure.cells)

@@ -2,7 +2,7 @@
 
 Rao's score test on the marginal likelihood, in which each frame's flange error and each corner's
 print error have been integrated out: the columns are whitened by what the robot's noise could
-have done. On raw pixel residuals the same test would cry out at every clean recording.
+have done. On raw pixel residuals the same test would flag every clean recording.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ _MORE_OF_IT = 2.0
 """Further amounts of an effect that is named must lower it by this much to be freed as well."""
 
 UNDECIDED = 6.0
-"""Rivals within this much of the best cannot be told apart by these data."""
+"""Rivals within this much of the best cannot be distinguished by these data."""
 
 _FITTED_IN_EARNEST = 6
 _MOST_EFFECTS = 6
@@ -226,7 +226,7 @@ class Search:
     def _best_of_tied(
         self, fit: JointFit, candidate: Candidate, trial: Trial
     ) -> tuple[Candidate, Trial]:
-        """The best of an effect's shapes that its score tests cannot tell apart.
+        """The best of an effect's shapes that its score tests cannot distinguish.
 
         As long as a large effect is missing the arm's scatter seems so large that its poses say
         nothing: from which row on a rolling shutter's pose counts shows only in a fit.
@@ -365,7 +365,7 @@ class Search:
                 self.steps = [s for s in self.steps if s.taken.effect != present.effect]
 
     def drop_on_joints(self, joints: set[str]) -> None:
-        """Hold what is told of joints that follow anything by a curve without a name.
+        """Hold what is reported of joints that follow anything by a curve without a name.
 
         A kink, or a cable's drag, is soaked up by a wave, a sag or a play, and a remainder: where
         there is a remainder, it was none of them. A wave loses its name for it, and so does a sag

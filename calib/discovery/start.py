@@ -78,7 +78,7 @@ def noise_guess(free: FreeViews, hand_eye: HandEye) -> Noise:
 
 
 UNKNOWN_POSE = (0.3, 1.0)
-"""A flange scatter (metres, radians) so large that a robot that said nothing has no say."""
+"""A flange scatter (metres, radians) so large that an absent robot has no influence."""
 
 
 @dataclass(frozen=True)

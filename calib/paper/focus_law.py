@@ -2,7 +2,7 @@
 
 `inverse_square`: alpha = alpha0 - k/d^2 (Eq. 25). `thin_lens`: alpha = alpha_inf d/(d - f), what a
 lens focused by moving as a whole does (its sign is opposite to the paper's curve).
-`constant`: alpha. Which one the data prefer is told by AICc with a common unknown noise scale,
+`constant`: alpha. Which one the data prefer is decided by AICc with a common unknown noise scale,
 so that a scatter larger than the corners' own (the robot's) does not pass for physics.
 """
 
@@ -48,7 +48,7 @@ class FocusLaw:
     aicc, bic:
         Information criteria; only differences mean something.
     scatter:
-        Standard deviation of the weighted residuals: 1 where the given sigmas tell all.
+        Standard deviation of the weighted residuals: 1 where the given sigmas explain all.
     """
 
     law: str
@@ -229,7 +229,7 @@ def choose_focus_law(
     """Fit every law and say which the data prefer; None where there are fewer than five views.
 
     A law with distance in it replaces the constant only when it beats it by `DECISIVE_AICC`;
-    between the two of them the lower AICc wins, and `decisive` tells whether by enough.
+    between the two of them the lower AICc wins, and `decisive` says whether by enough.
     """
     if len(distance_m) < 5:
         return None

@@ -452,7 +452,7 @@ def _fit(plane, image, w, matrix, good, given):  # type: ignore[no-untyped-def]
     """Robust, then plain least squares in normalised coordinates; false where no start is found.
 
     `matrix` holds the result, and the start where it is `given`; `good` the corners that count.
-    A robust fit only tells the wrong corners, so it need not be at its very end.
+    A robust fit only finds the wrong corners, so it need not be at its very end.
     """
     m = len(plane)
     p, q, rows = np.empty((2, m)), np.empty((2, m)), np.empty((5, m))

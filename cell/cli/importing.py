@@ -41,7 +41,7 @@ def import_(
         Path | None,
         typer.Option(
             help="Corner list of another finder (corners.vnl of mrcal, OpenCV's image_points, CSV,"
-            " JSON); the pictures tell its order."
+            " JSON); the pictures show its order."
         ),
     ] = None,
     rotation: Annotated[

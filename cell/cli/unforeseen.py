@@ -11,7 +11,7 @@ from importlib.metadata import version
 
 
 def arguments_of(error: BaseException) -> str:
-    """What the operator is told of an error in the program itself; its trace goes into a file."""
+    """What the operator sees of an error in the program itself; its trace goes into a file."""
     if isinstance(error, MemoryError):
         return "the memory of this computer is used up; use fewer or smaller pictures"
     reported = str(error).partition("\n")[0][:200]

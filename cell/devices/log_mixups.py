@@ -1,4 +1,4 @@
-"""Slips of the log that a simulated recording can be given: wrong pairs, units, conventions, arm.
+"""Mix-ups in the log that a simulated recording can be given: wrong pairs, units, conventions, arm.
 
 They change what is written, not what happened, so they are no part of the chain's physics. Names
 are those a diagnosis gives them, and a parameter means what it means there.
@@ -21,8 +21,8 @@ from cell.errors import InputError
 from cell.storage.files.cell_file import EffectFile
 
 
-def slip(views: Views, effect: EffectFile, rng: np.random.Generator) -> Views:
-    """The views with one slip in their log; raises `InputError` where it is not understood."""
+def mix_up(views: Views, effect: EffectFile, rng: np.random.Generator) -> Views:
+    """The views with one mix-up in their log; raises `InputError` where it is not understood."""
     return MIXUPS[effect.name](views, effect, rng)
 
 

@@ -87,7 +87,7 @@ def _serve(
     link: Connection, cell: SimulatedCell, arm: ArmWire, camera: CameraWire, address: str
 ) -> None:
     """In the peers' process: serve until the other end of `link` is gone."""
-    # Ctrl-C and a closed terminal reach the whole group; the arm must live to be told to stop
+    # Ctrl-C and a closed terminal reach the whole group; the arm must live to be ordered to stop
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     _compile(cell)

@@ -33,7 +33,7 @@ class PlannedCamera:
 
     @classmethod
     def of(cls, cell: CellFile) -> PlannedCamera:
-        """The sight of a cell; raises `InputError` where nothing tells its scale factor."""
+        """The sight of a cell; raises `InputError` where nothing states its scale factor."""
         camera = cell.camera
         alpha_px = cell.layout.alpha_px if cell.layout else None
         if alpha_px is None and camera.lens and camera.pixel_size_um:

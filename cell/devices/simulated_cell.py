@@ -25,7 +25,7 @@ from sim.log import tour
 from sim.render import Sensor
 
 _UNKNOWN_LENS = Lens(focal_length_mm=8.0, f_number=8.0)
-"""Where the file does not tell; it shapes the blur in pictures and nothing else."""
+"""Where the file does not state; it shapes the blur in pictures and nothing else."""
 
 
 def simulated_cell(
@@ -68,7 +68,7 @@ def simulated_cell(
 def present_effect(effect: EffectFile, where: str) -> Present:
     """An effect of the catalogue with its values; raises `InputError` for one it does not have.
 
-    `where` is the place in a file that the error tells.
+    `where` is the place in a file that the error names.
     """
     law = {} if effect.law is None else {"law": effect.law}
     try:
@@ -123,7 +123,7 @@ def _camera(cell: CellFile, truth: Simulation) -> CameraSpec:
 
 
 def home_of(plan: Plan) -> FloatArray:
-    """(6,) joint angles a simulated arm starts from; NaN where neither cell nor plan tells."""
+    """(6,) joint angles a simulated arm starts from; NaN where neither cell nor plan states."""
     if plan.cell.layout is not None:
         return np.asarray(np.radians(plan.cell.layout.home_deg))
     joints = plan.file.views[0].joints()

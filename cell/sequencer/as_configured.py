@@ -25,7 +25,7 @@ def check_as_configured(robot: RobotFile, arm: ArmKinematics, raw: Mapping[str, 
     robot, arm:
         Of the cell file, its joint limits narrowed as the file says.
     raw:
-        Of a reading. What the controller does not tell, or the file does not say, is not compared.
+        Of a reading. What controller or file do not state is not compared.
     """
     wrong = [*tcp_differs(robot, raw), *payload_differs(robot, raw), *limits_differ(arm, raw)]
     if wrong:

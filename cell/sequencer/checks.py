@@ -16,7 +16,7 @@ from cell.storage.files.plan_file import Checks
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the check of one frame said.
+    """What the check of one frame found.
 
     Attributes
     ----------

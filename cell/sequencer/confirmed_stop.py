@@ -50,7 +50,7 @@ class ConfirmedStop:
     arm, clock:
         The arm, connected, and the clock its `host_t_s` counts on.
     on_reading:
-        Told of every reading; must not raise or block.
+        Called with every reading; must not raise or block.
     """
 
     def __init__(

@@ -13,4 +13,4 @@ class Goal(Protocol):
         """Done once the frames of a run that is gone on with are taken into account."""
 
     def reached(self) -> str:
-        """Why no further view is needed, in words for the operator; empty while one is."""
+        """Why no further view is needed, as text for the operator; empty while one is."""

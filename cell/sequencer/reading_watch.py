@@ -1,7 +1,7 @@
-"""Every reading held against what the arm was told to do, on its way and where it stands.
+"""Every reading held against what the arm was ordered to do, on its way and where it stands.
 
 A person who pushes it, a controller that takes another path, a stop that drifts, a pose that cannot
-be: the arm stops, and the operator is told.
+be: the arm stops, and the operator is informed.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class ReadingWatch:
         self._moves = False
 
     def moves(self, here_rad: FloatArray, there_rad: FloatArray, joint_speed_rad_s: float) -> None:
-        """The arm is told to move straight from (6,) joint angles to others, no joint faster."""
+        """The arm is ordered to move straight from (6,) joint angles to others, no joint faster."""
         self._way, self._moves, self._allowed_rad = (here_rad, there_rad), True, CORRIDOR_RAD
         travel = np.abs(there_rad - here_rad)
         self._joint_speed_rad_s = joint_speed_rad_s * travel / max(float(travel.max()), 1e-12)
@@ -74,7 +74,7 @@ class ReadingWatch:
         Raises
         ------
         SafetyError
-            What is wrong, in words for the operator.
+            What is wrong, as text for the operator.
         """
         if self._recent and state.host_t_s <= self._recent[-1].host_t_s:
             return
@@ -152,7 +152,7 @@ class ReadingWatch:
                 " moves it: a person, another program, a brake that slips."
             )
         if off_rad > _ON_PATH_RAD:
-            self._guard.check_move(joints, joints, "the arm is not where it was told to be")
+            self._guard.check_move(joints, joints, "the arm is not where it was ordered to be")
 
     def _check_speed(self, state: ArmState) -> None:
         reported = state.joint_velocity_rad_s
@@ -169,7 +169,7 @@ class ReadingWatch:
                 f"the flange moved {1e3 * way_m:.0f} mm within {elapsed_s:.2f} s, the plan allows"
                 f" {limit_m_s:g} m/s"
             )
-        # Robot Web Services tell no speeds, and a controller that does may tell the ordered ones
+        # Robot Web Services report no speeds, and a controller may report the ordered ones
         turned = np.subtract(state.joints_rad or (), first.joints_rad or ())
         self._check_joint_speeds(np.abs(turned) / max(elapsed_s, _INSTANT_S))
         self._check_alive(first, state, elapsed_s)

@@ -10,7 +10,7 @@ from drivers.arm import ArmState, Motion
 REST_S = 0.25
 """So long must fresh readings agree, on the controller's own clock where it has one."""
 REST_RAD, REST_RAD_S = 5e-4, 0.01
-"""They agree within so much, and no joint is told to turn faster: 2 mrad/s over `REST_S`."""
+"""They agree within so much, and no joint is ordered to turn faster: 2 mrad/s over `REST_S`."""
 
 
 class RestEvidence:
@@ -29,9 +29,9 @@ class RestEvidence:
     Attributes
     ----------
     missing:
-        What keeps the readings from proving it, in words for the operator.
+        What keeps the readings from proving it, as text for the operator.
     fresh:
-        Whether the newest reading was a fresh one, which told of motion or of rest.
+        Whether the newest reading was a fresh one, which showed motion or rest.
     """
 
     def __init__(self, ordered_s: float, before: ArmState | None, least_way_rad: float) -> None:
@@ -60,7 +60,7 @@ class RestEvidence:
 
     @property
     def standing(self) -> bool:
-        """Whether the newest readings tell of rest, if not for long enough yet."""
+        """Whether the newest readings show rest, if not for long enough yet."""
         return self._anchor is not None
 
     def lost(self, why: str) -> None:
@@ -89,7 +89,7 @@ class RestEvidence:
 
 
 def _joints(state: ArmState) -> FloatArray | None:
-    """(6,) joint angles, None where they are not told or not finite."""
+    """(6,) joint angles, None where they are not reported or not finite."""
     if state.joints_rad is None:
         return None
     joints = np.asarray(state.joints_rad, dtype=float)
@@ -97,7 +97,7 @@ def _joints(state: ArmState) -> FloatArray | None:
 
 
 def fastest_rad_s(state: ArmState) -> float:
-    """Speed of the fastest joint as the controller tells it; 0 where it does not."""
+    """Speed of the fastest joint as the controller reports it; 0 where it does not."""
     reported = state.joint_velocity_rad_s
     return 0.0 if reported is None else float(np.abs(reported).max(initial=0.0))
 

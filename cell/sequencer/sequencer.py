@@ -77,7 +77,7 @@ class Sequencer:
     stop, requests:
         Asked to stop, to pause, to give a view up by others.
     watchers:
-        Who is told what happens.
+        Who is notified of what happens.
     goal:
         What may end the run before it has taken all views; nothing does where not given.
     guide:
@@ -126,7 +126,7 @@ class Sequencer:
 
         Returns
         -------
-        How it ended; errors of devices, limits and input are told there. What nobody foresaw is
+        How it ended; errors of devices, limits and input are part of it. What nobody foresaw is
         raised again once the arm has stopped and the journal is closed.
         """
         error: BaseException | None = None
@@ -161,7 +161,7 @@ class Sequencer:
         )
 
     def _stop_arm(self, fault: BaseException | None, last_s: float) -> BaseException | None:
-        """Stop the arm, at a fault or at the end; returns what the operator is told first.
+        """Stop the arm, at a fault or at the end; returns what the operator must read first.
 
         Until `time.monotonic` is `last_s` it is watched while a frame is in hand.
         """
@@ -176,7 +176,7 @@ class Sequencer:
         return error
 
     def _stand_by(self, error: BaseException | None, last_s: float) -> BaseException | None:
-        """Watch the arm while the frame in hand is checked; returns what is told first then."""
+        """Watch the arm while the frame in hand is checked; returns what is reported first then."""
         job = self._checking[1] if self._checking else None
 
         def busy() -> bool:
@@ -432,7 +432,7 @@ class Sequencer:
             self._journal.write(event, **values)
 
     def _notify(self, state: State, event: str | None = None) -> None:
-        """Tell the watchers; one that fails (a terminal that is gone) is not told again."""
+        """Notify the watchers; one that fails (a terminal that is gone) is not notified again."""
         self._state = state
         progress = self._progress
         status = Status(

@@ -118,7 +118,7 @@ class RunResult:
     finish:
         Why it ended.
     reason:
-        In words for the operator; empty when it is completed.
+        As text for the operator; empty when it is completed.
     ended_early:
         Why a completed run did not need all views of its plan; empty where it took them.
     frames:

@@ -18,7 +18,7 @@ class StopRequest:
     count:
         How often a stop was asked for.
     reason:
-        Who asked first, in words.
+        Who asked first, as text.
     """
 
     def __init__(self) -> None:

@@ -52,7 +52,7 @@ class WatchedArm:
     stop_request:
         Looked at in every wait.
     on_reading:
-        Told of every reading; must not raise or block.
+        Called with every reading; must not raise or block.
     connected:
         Whether `connect` succeeded: from then on every fault stops the arm.
     """
@@ -96,7 +96,7 @@ class WatchedArm:
         ArmStopped, DeviceUnreachable
             The arm stopped by itself, or its readings are stale.
         SafetyError
-            It is not where it was told to be, or its readings cannot be: see `ReadingWatch`.
+            It is not where it was ordered to be, or its readings cannot be: see `ReadingWatch`.
         """
         if self.stop_request.asked:
             raise StoppedByOperator(f"stopped by {self.stop_request.reason}")
@@ -129,7 +129,7 @@ class WatchedArm:
         return _SURE_SHARE * speed_rad_s * max(age_s, 0.0) if undisturbed else 0.0
 
     def _speed_rad_s(self, newest: ArmState) -> float:
-        """Of the fastest joint, as the controller tells it or as its readings do."""
+        """Of the fastest joint, as the controller reports it or as its readings do."""
         previous = self._previous
         if newest.joint_velocity_rad_s is not None:
             return fastest_rad_s(newest)
@@ -148,7 +148,7 @@ class WatchedArm:
         return job.result()
 
     def reading_after(self, host_t_s: float) -> ArmState:
-        """The first reading that is not older than that time; some controllers tell seldom.
+        """The first reading that is not older than that time; some controllers report seldom.
 
         After `READING_PATIENCE_S` without one the newest reading is returned as it is.
         """
@@ -190,7 +190,7 @@ class WatchedArm:
                 )
 
     def settle(self, settle: Settle, where: str) -> None:
-        """Wait until the arm has told for long enough that it stands still."""
+        """Wait until the arm has reported for long enough that it stands still."""
         began_s = self.clock.now()
         still_since_s: float | None = None
         while True:
@@ -225,7 +225,7 @@ class WatchedArm:
 
         Returns
         -------
-        What the operator must be told first, and the word of the stop; None for an arm that was
+        What the operator must read first, and the word of the stop; None for an arm that was
         never reached.
         """
         if not self.connected:
@@ -268,7 +268,7 @@ def _shouted(word: StopReport, because: str) -> StopFailed:
 
 
 def joints_of(state: ArmState) -> FloatArray:
-    """(6,) joint angles; raises `DeviceError` for an arm that does not tell them."""
+    """(6,) joint angles; raises `DeviceError` for an arm that does not report them."""
     if state.joints_rad is None:
         raise DeviceError("the arm does not report its joint angles; a run cannot be checked")
     return np.asarray(state.joints_rad, dtype=float)

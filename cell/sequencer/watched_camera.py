@@ -1,4 +1,4 @@
-"""What is asked of the camera, so that its loss is told from the arm's."""
+"""What is asked of the camera, so that its loss is not taken for the arm's."""
 
 from __future__ import annotations
 

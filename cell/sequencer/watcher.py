@@ -21,7 +21,7 @@ class Checked:
     shot:
         The picture and the arm's readings around it.
     verdict:
-        What the check said.
+        What the check found.
     record:
         Its line in the recording; None for a frame that is not kept.
     """
@@ -32,7 +32,7 @@ class Checked:
 
 
 class Watcher:
-    """Sees a run go by. No method may block; one that raises is the last that its watcher is told.
+    """Sees a run go by. No method may block; one that raises ends its watcher's notices.
 
     Override what is wanted.
     """

@@ -64,7 +64,7 @@ def calibrate_recording(
     recording, corners:
         What was recorded, and the corners in its pictures where they are known already.
     progress:
-        Told after every picture searched.
+        Called after every picture searched.
     mended:
         The recording's frames with the log put right, to be calibrated in place of the log as
         it stands.

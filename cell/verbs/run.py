@@ -147,7 +147,7 @@ class Outcome:
     text, mapping:
         For people, and for programs.
     undetermined:
-        What of the calibration the frames do not determine, in words.
+        What of the calibration the frames do not determine, as text.
     """
 
     folder: Path

@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform
 from calib.chain.effect import Present
 from calib.views import Views
 from cell.devices.factory import simulated_devices
-from cell.devices.log_mixups import MIXUPS, slip
+from cell.devices.log_mixups import MIXUPS, mix_up
 from cell.devices.nominal_cell import nominal
 from cell.devices.simulated_cell import home_of, log_of, present_effect, simulated_cell
 from cell.errors import BadAnswer, InputError
@@ -86,7 +86,7 @@ def simulated_views(plan: Plan, cell: SimulatedCell) -> Views:
     rng = cell.random(_SLIP_STREAM)
     for effect in effects:
         if effect.name in MIXUPS:
-            views = slip(views, effect, rng)
+            views = mix_up(views, effect, rng)
     return views
 
 

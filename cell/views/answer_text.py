@@ -14,7 +14,7 @@ _DOMINATES = 2.0
 
 
 def dominant(error: Mapping[str, Any]) -> str | None:
-    """Which part of the error is the larger by far, in words."""
+    """Which part of the error is the larger by far, as text."""
     shared, each = SIGMAS * (error.get("calibration_sigma") or 0.0), error["each_picture_p95"]
     if shared > _DOMINATES * each:
         return (

@@ -7,7 +7,7 @@ from typing import Any
 
 
 def provenance_text(content: Mapping[str, Any]) -> str:
-    """One line out of a result file's keys; what is not known is said to be so."""
+    """One line out of a result file's keys; what is not known is named as such."""
     devices = ", ".join(_device(name, content.get(name) or {}) for name in ("camera", "robot"))
     recorded = content.get("recorded") or "at a time that is not known"
     made = content.get("created") or "at a time that is not known"

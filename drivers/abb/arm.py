@@ -137,7 +137,7 @@ class ABBArm:
         self._supervisor = supervisor
 
     def _reading(self, supervisor: Supervisor) -> Reading:
-        # a stream that has ended with its program tells of the last moment of the way
+        # a stream that has ended with its program shows the last moment of the way
         streaming = self._egm is not None and supervisor.busy
         streamed = self._egm.fresh() if streaming and self._egm is not None else None
         if streamed is not None:
@@ -145,7 +145,7 @@ class ABBArm:
         if supervisor.newest is None or supervisor.silent_s > self._settings.silence_s:
             raise DeviceUnreachable(
                 self._named(
-                    f"no robot state for {supervisor.silent_s:.1f} s. The arm was told to stop, "
+                    f"no robot state for {supervisor.silent_s:.1f} s. The arm was ordered to stop, "
                     f"which nobody confirms{self._watched()}: look at it, and press the emergency "
                     "stop if it moves. "
                     "Check the network and the controller, then connect again"

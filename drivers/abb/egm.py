@@ -3,7 +3,7 @@
 The controller sends them to a UDP port of this host while a motion program runs. The pose is that
 of tool0 in the world, since the motion programs use tool0 and wobj0. Anybody can send to a UDP
 port: only what comes from the controller's own address, in order and plausible, is a reading. The
-rest is dropped, counted and told once for each reason; it never ends the thread that receives.
+rest is dropped, counted and reported once for each reason; it never ends the thread that receives.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ class LinkWatch:
             )
 
     def reset(self) -> None:
-        """Tell the task the limit, and forget whatever a run before left there."""
+        """Set the task's limit, and forget whatever a run before left there."""
         if self._limit_s is not None:
             self._set("beat", 0)
             self._set("limit", self._limit_s)

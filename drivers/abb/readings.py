@@ -16,14 +16,14 @@ from drivers.errors import DeviceError
 
 @dataclass(frozen=True)
 class Reading:
-    """What the controller told of the arm.
+    """What the controller reported of the arm.
 
     Attributes
     ----------
     host_t_s:
         Host clock (`time.monotonic`) when it was asked for, or when EGM's message came.
     controller_t_s:
-        The controller's clock; None from RWS, which tells none.
+        The controller's clock; None from RWS, which states none.
     joints_rad:
         Six joint angles.
     base_from_flange:
@@ -54,7 +54,7 @@ def read_rws(
     """Ask for joints and flange pose, in two requests; they are of one instant if it stands.
 
     Where the joints are what they were in the reading `before`, to the last digit that the
-    controller tells, so is the pose, and it is not asked for again. Raises `DeviceError` for what
+    controller reports, so is the pose, and it is not asked for again. Raises `DeviceError` for what
     can be no reading of an arm whose joints have the limits `limits_rad`.
     """
     joints = rws.get_jointtarget()

@@ -47,7 +47,7 @@ def open_rws(
         Called with method and URL before each request; may raise `Cancelled`.
     """
     try:
-        import abb_motion_program_exec  # noqa: F401 - told now rather than at the first move
+        import abb_motion_program_exec  # noqa: F401 - missing is better known now than at the first move
         from abb_robot_client.rws import RWS
     except ImportError as error:
         raise DeviceRefused(
@@ -90,7 +90,7 @@ def named(url: str) -> Iterator[None]:
     DeviceUnreachable
         No connection, or no answer in time.
     DeviceRefused
-        Wrong password, or the controller said no.
+        Wrong password, or the controller refused.
     DeviceError
         Anything else that the library raises.
     """

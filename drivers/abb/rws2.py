@@ -27,12 +27,12 @@ _NO_CONTENT = 204
 
 
 class Rws2Refused(Exception):
-    """The controller said no.
+    """The controller refused.
 
     Attributes
     ----------
     code:
-        Its return code; the HTTP status where it tells none, -1 for a login that was refused.
+        Its return code; the HTTP status where it states none, -1 for a login that was refused.
     """
 
     def __init__(self, message: str, code: int) -> None:

@@ -29,7 +29,7 @@ class ABBSettings:
         Between two questions to an arm on its way; see `drivers.abb.pace`. The controller bears
         fewer than twenty requests a second.
     silence_s:
-        Without a fresh reading for so long, the link counts as lost and the arm is told to stop.
+        Without a fresh reading for so long, the link counts as lost and the arm is ordered to stop.
     link_watch_s:
         The controller stops a motion when it hears nothing from here for so long; None where
         `rapid/cell_watch.mod` is not loaded there, and then a cut cable stops nothing.

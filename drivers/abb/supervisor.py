@@ -57,7 +57,7 @@ class Supervisor:
     fault:
         None, or what stopped the arm.
     stop_failed:
-        None, or why it is not known that the arm stopped when it was told to.
+        None, or why it is not known that the arm stopped when it was ordered to.
     newest:
         The newest reading.
     """
@@ -248,7 +248,7 @@ class Supervisor:
             self._stop_s = self.stop_failed = None
             return False
         if time.monotonic() - self._stop_s > _STOP_CONFIRM_S:
-            self.stop_failed = f"it still moves {_STOP_CONFIRM_S:g} s after it was told to stop"
+            self.stop_failed = f"it still moves {_STOP_CONFIRM_S:g} s after it was ordered to stop"
         return True
 
     def _reason(self, off: str) -> str:

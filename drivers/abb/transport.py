@@ -73,7 +73,7 @@ def resolved(address: str, certificate_sha256: str | None) -> str:
 def generation_of(url: str, certificate_sha256: str | None) -> int:
     """Return which Robot Web Services answer: `IRC5` (RobotWare 6) or `OMNICORE` (RobotWare 7).
 
-    They are told apart by the login that they ask for, before any is sent.
+    They are distinguished by the login that they ask for, before any is sent.
 
     Raises
     ------

@@ -87,7 +87,7 @@ class URArm:
         """Return the newest packet, with the flange's pose freed of the tool offset.
 
         Raises `DeviceUnreachable` when it is stale. A link that was lost is tried again, so that a
-        reading can tell whether the arm stands; the loss stays a fault until `connect`.
+        reading can show whether the arm stands; the loss stays a fault until `connect`.
         """
         packet = self._reader.newest()
         supervisor = self._connected()

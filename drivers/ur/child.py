@@ -97,7 +97,7 @@ def _obey(control: Any, events: TextIO, order: dict[str, Any], before: int | Non
 
 
 def _progress(control: Any, events: TextIO, before: int | None) -> int | None:
-    """Tell when the motion that came after operation `before` has ended."""
+    """Signal when the motion that came after operation `before` has ended."""
     if before is None:
         return None
     status = control.getAsyncOperationProgressEx()

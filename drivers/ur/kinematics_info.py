@@ -36,7 +36,7 @@ class KinematicsInfo:
     theta_rad, a_m, d_m, alpha_rad:
         Six each, standard convention.
     checksum:
-        The controller's six checksums; they tell one arm from another.
+        The controller's six checksums; they distinguish one arm from another.
     calibration_status:
         ``linearised`` where a factory calibration is in force.
     joint_limits_rad:
@@ -71,7 +71,7 @@ class KinematicsInfo:
 
 
 def read_kinematics(host: str, timeout_s: float = 1.0) -> KinematicsInfo | None:
-    """Return what the primary port tells, or None where it tells nothing within the time-out.
+    """Return what the primary port states, or None where it sends nothing within the time-out.
 
     Raises `DeviceError` for kinematics that are not finite.
     """

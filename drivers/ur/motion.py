@@ -104,7 +104,7 @@ class MotionChild:
         self._send(vars(order))
 
     def beat(self) -> None:
-        """Tell the child that this process is alive."""
+        """Show the child that this process is alive."""
         self._send({"order": "beat"})
 
     def kill(self) -> None:

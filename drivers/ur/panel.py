@@ -1,6 +1,6 @@
 """What is asked and ordered of a controller beside its motion, whichever PolyScope it runs.
 
-PolyScope 3 and 5 have the dashboard server for it, PolyScope X the robot API. Both are told apart
+PolyScope 3 and 5 have the dashboard server for it, PolyScope X the robot API. Which it is shows
 by what answers.
 """
 
@@ -38,7 +38,7 @@ class Panel(Protocol):
         """What ends the program that runs."""
 
     def identity(self) -> dict[str, str]:
-        """Version, model and serial number, as far as the controller tells them."""
+        """Version, model and serial number, as far as the controller reports them."""
 
     def in_local_mode(self) -> bool:
         """Whether programs from outside are ignored; False where the controller cannot say."""

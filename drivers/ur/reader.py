@@ -1,4 +1,4 @@
-"""Our own RTDE reader: one atomic packet a cycle, with time-outs, and loss told at once.
+"""Our own RTDE reader: one atomic packet a cycle, with time-outs, and loss reported at once.
 
 ur-rtde's receive interface goes on answering the last pose after the link is gone, takes every
 value under a lock of its own, and cannot read the TCP offset; so poses do not come from it.
@@ -31,7 +31,7 @@ OUTPUTS = [
     "runtime_state",
 ]
 OPTIONAL = ["payload"]
-"""What older controllers do not tell."""
+"""What older controllers do not report."""
 _UNKNOWN = "NOT_FOUND"
 _REOPEN_S, _REOPEN_PAUSE_S = 0.5, 0.05
 
@@ -151,7 +151,7 @@ class RtdeReader:
         if lost is not None or self._newest is None:
             raise DeviceUnreachable(
                 f"UR controller {self._host}: no robot state ({lost or 'nothing received'}). The "
-                "arm was told to stop, and its own watchdog stops it: look whether it stands. "
+                "arm was ordered to stop, and its own watchdog stops it: look whether it stands. "
                 "Check the network and the controller, then connect again"
             )
         return self._newest

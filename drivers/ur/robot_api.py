@@ -58,7 +58,7 @@ class RobotApi:
         return printable(version)
 
     def identity(self) -> dict[str, str]:
-        """Version, model and serial number, as far as the controller tells them."""
+        """Version, model and serial number, as far as the controller reports them."""
         reported = {"robot_api": self.version()}
         places = {
             "polyscope": ("/versions/v1", "marketingVersion"),

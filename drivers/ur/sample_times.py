@@ -1,7 +1,7 @@
 """When a packet was sampled, on the host's clock: a packet that waited is older than its arrival.
 
 A busy computer, or network, hands packets over in bursts. Taken for what they say at their arrival,
-they tell of an arm at rest that has long begun to move, or of one that moves and has long stopped.
+they describe an arm at rest that has long begun to move, or of one that moves and has long stopped.
 """
 
 from __future__ import annotations

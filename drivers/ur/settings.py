@@ -16,7 +16,7 @@ class URSettings:
     rate_hz:
         RTDE packets a second.
     silence_s:
-        Without a fresh packet for so long, the link counts as lost and the arm is told to stop.
+        Without a fresh packet for so long, the link counts as lost and the arm is ordered to stop.
     watchdog_hz:
         The controller stops the program when our process gives no sign at this rate.
     heartbeat_s:

@@ -13,7 +13,7 @@ from drivers.arm import MoveTarget
 from drivers.ur.kinematics_info import KinematicsInfo
 
 _SAMPLES = 65
-_LONGEST_REACH_M = 1.5  # UR10e 1.3 m and its wrist; for a controller that tells no kinematics
+_LONGEST_REACH_M = 1.5  # UR10e 1.3 m and its wrist; for a controller that states no kinematics
 _LEAST = 1e-3
 
 

@@ -44,7 +44,7 @@ class Supervisor:
     fault:
         None, or what stopped the arm; set until `clear`.
     stop_failed:
-        None, or why it is not known that the arm stopped when it was told to.
+        None, or why it is not known that the arm stopped when it was ordered to.
     """
 
     def __init__(self, host: str, settings: URSettings, reader: RtdeReader, panel: Panel) -> None:
@@ -118,7 +118,7 @@ class Supervisor:
             self._cause_known = False
 
     def why(self) -> str | None:
-        """The fault in its own words: of a stop just ordered, a packet soon tells the cause."""
+        """The fault in its own words: of a stop just ordered, a packet soon gives the cause."""
         while self.fault and not self._cause_known and time.monotonic() - self._tripped_s < _WHY_S:
             time.sleep(_CYCLE_S)
         return self.fault
@@ -162,7 +162,7 @@ class Supervisor:
                 self._trip(str(error))
                 self._reap()
                 self._repeat_stop()
-                # whether the arm stands is told by a reading or not at all
+                # only a reading shows whether the arm stands
                 self._reader.reopen()
             except Exception as error:
                 # nobody would watch the arm any more: whatever it is, stop first
@@ -173,7 +173,7 @@ class Supervisor:
         fault = reported or self._remote.fault or self._program.fault(self._child, packet)
         if fault is not None:
             self._trip(fault)
-        # the child may notice before the packet comes that tells why
+        # the child may notice before the packet comes that says why
         self.fault, self._cause_known = (
             reported or self.fault,
             self._cause_known or reported is not None,
@@ -196,7 +196,7 @@ class Supervisor:
             self._stop_s = self.stop_failed = None
         elif now - self._stop_s > _STOP_CONFIRM_S:
             self.stop_failed = (
-                f"the arm still moves {_STOP_CONFIRM_S:g} s after it was told to stop"
+                f"the arm still moves {_STOP_CONFIRM_S:g} s after it was ordered to stop"
             )
         self._repeat_stop()
 
@@ -220,7 +220,7 @@ class Supervisor:
             self._child.move(self._order)
             self._order_sent = True
         elif at_rest(packet) and time.monotonic() - packet.host_t_s < self._child.in_phase_s:
-            # a packet from before the child said so may be from before the motion
+            # a packet from before the child reported it may be from before the motion
             order, self._order = self._order, None
             off = missed(order, packet)
             if off is not None:

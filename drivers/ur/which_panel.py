@@ -1,4 +1,4 @@
-"""Tells PolyScope 3 and 5 from PolyScope X by what answers."""
+"""Distinguishes PolyScope 3 and 5 from PolyScope X by what answers."""
 
 from __future__ import annotations
 

@@ -123,7 +123,7 @@ def with_mounted(cell: CellFile, turn: Rotation) -> CellFile:
         (Rotation.from_euler("z", 90, degrees=True), "the board does not move in the picture", 3),
     ],
 )
-def test_a_layout_wrong_beyond_what_is_told_ends_the_moves(
+def test_a_layout_wrong_beyond_what_is_stated_ends_the_moves(
     turn: Rotation, says: str, most_moves: int, tmp_path: Path
 ) -> None:
     path = written(with_mounted(ur3(), turn), tmp_path)

@@ -41,7 +41,7 @@ def test_three_shifts_take_the_place_of_a_layout(tmp_path: Path) -> None:
 
 
 def test_a_board_of_unknown_place_on_the_flange_may_want_more_room(tmp_path: Path) -> None:
-    """Neither board nor camera is known: what may be there bars the way, and that is said."""
+    """Neither board nor camera is known: what may be there bars the way, and that is reported."""
     unknown, start_deg = without_layout(eye_to_hand(), 4.7)
     with pytest.raises(BadAnswer, match="what is at the flange would strike keep-out box"):
         run_trial(unknown, tmp_path / "trial", start_deg)
@@ -78,7 +78,7 @@ def test_without_a_layout_whatever_is_at_the_flange_may_point_anywhere() -> None
     assert uncertainty_m == pytest.approx(0.1 + np.hypot(0.16, 0.12), abs=1e-9)
 
 
-def test_what_is_lacking_is_said_before_anything_moves(tmp_path: Path) -> None:
+def test_what_is_lacking_is_reported_before_anything_moves(tmp_path: Path) -> None:
     unknown, _ = without_layout(ur3(), 3.8)
     no_pixel = unknown.camera.model_copy(update={"pixel_size_um": None})
     path = written(unknown.model_copy(update={"camera": no_pixel}), tmp_path)

@@ -137,7 +137,7 @@ def test_frames_partly_without_poses_are_used_for_what_they_can() -> None:
     assert np.isnan(found.solutions["joint_ml"].camera_from_board[::5]).all()
 
 
-def test_without_parallel_views_tilted_ones_serve_and_it_is_said() -> None:
+def test_without_parallel_views_tilted_ones_serve_and_it_is_reported() -> None:
     rng = np.random.default_rng(2)
     true = scene(
         distance_m=rng.uniform(0.35, 1.2, 24),
@@ -213,7 +213,7 @@ def test_the_file_fits_its_published_schema(mount: str) -> None:
 
 
 @pytest.mark.parametrize("lens", ["inverse_square", "thin_lens"])
-def test_the_joint_fit_tells_its_own_focus_with_its_covariance(lens: str) -> None:
+def test_the_joint_fit_reports_its_own_focus_with_its_covariance(lens: str) -> None:
     true = mixed_scene(noise_px=0.05, robot_mm=0.02, robot_deg=0.002, **LENSES[lens])
     found = calibrate(true.views)
     joint = found.solutions["joint_ml"]

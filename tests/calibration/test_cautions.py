@@ -1,4 +1,4 @@
-"""What the data do not determine, or contradict, is said with its remedy and refused later on."""
+"""What the data do not determine, or contradict, is reported with its remedy and refused later."""
 
 from __future__ import annotations
 

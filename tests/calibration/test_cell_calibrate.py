@@ -70,7 +70,7 @@ def test_two_frames_only_is_a_bad_answer_with_exit_status_1(tmp_path: Path) -> N
     assert not (tmp_path / "out").exists()
 
 
-def test_pictures_that_are_no_images_are_told_frame_by_frame(tmp_path: Path) -> None:
+def test_pictures_that_are_no_images_are_reported_frame_by_frame(tmp_path: Path) -> None:
     folder = _write(tmp_path / "bad", mixed_scene().views.take(np.arange(4)))
     (folder / "detections.csv").unlink()
     (folder / "broken.png").write_text("not a picture")

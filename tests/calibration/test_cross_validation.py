@@ -157,7 +157,7 @@ def test_frames_that_alone_fix_a_number_cannot_be_left_out() -> None:
         cross_validate(replace(joint, own_error=same), flat, SPAN_M)
 
 
-def test_a_fit_that_does_not_come_to_rest_is_no_witness(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fit_that_does_not_come_to_rest_is_no_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
     joint, views = fitted(0)
 
     def restless(*given: Any, **named: Any) -> JointFit:
@@ -168,7 +168,7 @@ def test_a_fit_that_does_not_come_to_rest_is_no_witness(monkeypatch: pytest.Monk
         cross_validate(joint, views, SPAN_M)
 
 
-def test_the_file_tells_it_all() -> None:
+def test_the_file_holds_it_all() -> None:
     found = calibrate(mixed_scene(noise_px=0.1, robot_mm=0.03, robot_deg=0.003).views)
     content = CalibrationFile.model_validate(as_mapping(found, "bench"))
     reported, kept = content.cross_validation, found.cross_validation

@@ -1,4 +1,4 @@
-"""Wrong corners, a frame in the wrong order, a frame with another's pose: found, told, harmless."""
+"""Wrong corners, a frame in the wrong order, a frame with another's pose: found and harmless."""
 
 from dataclasses import replace
 from functools import cache
@@ -48,7 +48,7 @@ def _alpha_px(joint: dict[str, Any], distance_m: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
-def test_everything_wrong_is_found_and_told_and_nothing_else(mount: Mount) -> None:
+def test_everything_wrong_is_found_and_reported_and_nothing_else(mount: Mount) -> None:
     clean = _clean(mount)
     spoilt, wrong = _spoilt(clean)
     found = calibrate(spoilt)

@@ -36,7 +36,7 @@ def fitted(frames: int, mount: Mount = "eye_in_hand", seed: int = 0) -> JointFit
     return fit_roughly_known(views, guess, DOUBT)
 
 
-def test_one_view_leaves_the_mount_as_open_as_it_was_told() -> None:
+def test_one_view_leaves_the_mount_as_open_as_it_was_stated() -> None:
     fit = fitted(1)
     assert fit.sigma("flange_from_mounted.x") == pytest.approx(DOUBT.mounted_m, rel=0.05)
     assert fit.sigma("flange_from_mounted.rx") == pytest.approx(DOUBT.mounted_rad, rel=0.05)

@@ -17,7 +17,7 @@ from calib.views import Board, FloatArray
 from tests.detection.board_rendering import render_board
 
 BOARD = Board("chessboard", 5, 6, 0.03)
-SAID = "5x6x0.03"
+STATED = "5x6x0.03"
 WIDTH, HEIGHT, F_PX = 320, 240, 330.0
 HAND = RigidTransform.from_components([0.03, -0.05, 0.08], Rotation.from_rotvec([0.1, -0.05, 0.4]))
 SPOT = RigidTransform.from_components([-0.1, -0.33, 0.0], Rotation.from_rotvec([3.1, 0.1, 0.2]))

@@ -13,7 +13,7 @@ from drivers.arm import ArmState, Motion, MoveTarget
 from drivers.camera import FocusSetting, Frame
 
 BRAKE_S = 0.02
-"""From the order to the halt: no arm stands where it was when it was told to stop."""
+"""From the order to the halt: no arm stands where it was when it was ordered to stop."""
 HOME = np.radians([0, -90, 90, -90, -90, 0])
 
 

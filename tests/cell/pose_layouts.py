@@ -370,7 +370,7 @@ LAYOUTS: dict[str, Layout] = {
         file("p.csv", lambda F: _timed(F, "timestamp,x,y,z,qx,qy,qz,qw")), STAMPED),
     "timestamps, EuRoC's first row": Layout(
         file("p.csv", lambda F: _timed(F, "#timestamp,p_x,p_y,p_z,q_x,q_y,q_z,q_w")), STAMPED),
-    "timestamps around the pictures', rotation said": Layout(
+    "timestamps around the pictures', rotation stated": Layout(
         file("p.csv", lambda F: _timed(F, "")), STAMPED, {"rotation": "quat_xyzw"}),
     "timestamps of a moving arm": Layout(file("p.csv", _interpolated), STAMPED),
     "RAPID robtargets": Layout(file("cal.mod", _rapid), "img{m:02d}.png"),
@@ -398,7 +398,7 @@ LAYOUTS: dict[str, Layout] = {
         1e3 * position(F), scalar_first(F), separator=","))),
     "UR, rotation vector": Layout(file("p.txt", lambda F: table(
         position(F), turn(F).as_rotvec()))),
-    "UR, rotation said": Layout(file("p.txt", lambda F: table(
+    "UR, rotation stated": Layout(file("p.txt", lambda F: table(
         position(F), turn(F).as_rotvec())), stated={"rotation": "rotvec"}),
     "rotation vector in degrees": Layout(file("p.csv", lambda F: table(
         1e3 * position(F), turn(F).as_rotvec(degrees=True), separator=";"))),

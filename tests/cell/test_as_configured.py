@@ -25,7 +25,7 @@ WIDE = ((-2 * np.pi, 2 * np.pi),) * 6
 
 
 class SetArm(FakeArm):
-    """Its controller tells how it is set."""
+    """Its controller reports how it is set."""
 
     raw: dict[str, Any]
 
@@ -75,7 +75,7 @@ def test_a_difference_ends_the_run_before_the_first_move_with_both_values(
         (SET, {"payload": None, "tcp": None, "limits": None}),
         (CELL, {"payload": 3.0, "tcp": (0, 0, 0.3, 0, 0, 0)}),
     ],
-    ids=["the same", "nearly", "not told", "not said"],
+    ids=["the same", "nearly", "not reported", "not stated"],
 )
 def test_what_agrees_or_is_not_known_is_no_obstacle(
     tmp_path: Path, cell: str, reported: dict[str, Any]

@@ -16,7 +16,7 @@ def test_white_is_that_of_the_board_and_not_of_its_surroundings(dtype):
     assert white_level(board_picture(0.7, dtype), corners) == pytest.approx(0.7, abs=0.01)
 
 
-def test_light_that_falls_with_distance_is_told_and_scatter_is_not():
+def test_light_that_falls_with_distance_is_reported_and_scatter_is_not():
     rng = np.random.default_rng(3)
     distance_m = rng.uniform(0.3, 1.0, 30)
     scatter = rng.normal(0, 0.01, 30)

@@ -1,4 +1,4 @@
-"""Every verb from outside: arguments, exit status, what is said where."""
+"""Every verb from outside: arguments, exit status, what is printed where."""
 
 from __future__ import annotations
 
@@ -56,7 +56,9 @@ def plan(tmp_path: Path) -> Path:
     return tmp_path / "plan.yaml"
 
 
-def test_a_dry_run_records_and_can_be_told_as_json(cell: Cell, plan: Path, tmp_path: Path) -> None:
+def test_a_dry_run_records_and_can_be_reported_as_json(
+    cell: Cell, plan: Path, tmp_path: Path
+) -> None:
     done = cell("run", plan, "--dry-run", "--record-only", "-o", tmp_path / "r", "--json")
     assert done.status == 0, done.err
     result = json.loads(done.out)
@@ -269,9 +271,9 @@ def test_a_simulated_cell_that_cannot_be_is_refused_and_no_error_of_the_program(
 ) -> None:
     file = tmp_path / "bench.yaml"
     file.write_text(file.read_text().replace(old, new))
-    said = cell("simulate", plan, "-o", tmp_path / "made")
-    assert words in said.err
-    assert said.status == 2
+    result = cell("simulate", plan, "-o", tmp_path / "made")
+    assert words in result.err
+    assert result.status == 2
 
 
 def test_a_board_behind_the_simulated_camera_is_named(cell: Cell, tmp_path: Path) -> None:
@@ -280,6 +282,6 @@ def test_a_board_behind_the_simulated_camera_is_named(cell: Cell, tmp_path: Path
     name = tmp_path / "irb140-eosens.cell.yaml"
     if "eye_to_hand" not in name.read_text():
         name.write_text(name.read_text() + "mount: eye_to_hand\n")
-    said = cell("simulate", tmp_path / "irb140-eosens.plan.yaml", "-o", tmp_path / "made")
-    assert said.status == 2
-    assert "Does the board stand before the camera there?" in said.err
+    result = cell("simulate", tmp_path / "irb140-eosens.plan.yaml", "-o", tmp_path / "made")
+    assert result.status == 2
+    assert "Does the board stand before the camera there?" in result.err

@@ -1,4 +1,4 @@
-"""Compiled code has a place wherever the program is installed, and the wait for it is told."""
+"""Compiled code has a place wherever the program is installed, and the wait for it is announced."""
 
 import os
 import stat

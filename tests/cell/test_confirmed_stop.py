@@ -133,7 +133,7 @@ def test_readings_that_prove_nothing_are_never_taken_for_a_stop(
     assert "PRESS THE EMERGENCY STOP" in word.text
 
 
-def test_an_arm_that_takes_the_order_and_drives_on_is_told_to_move(
+def test_an_arm_that_takes_the_order_and_drives_on_is_reported_as_moving(
     moving: Reading, clock: FastClock
 ) -> None:
     moving.obeys_after_s = np.inf
@@ -150,7 +150,7 @@ def test_an_arm_that_creeps_is_not_at_rest(moving: Reading, clock: FastClock) ->
     assert not word.stands
 
 
-def test_an_order_that_is_refused_is_no_stop_and_its_words_are_told(
+def test_an_order_that_is_refused_is_no_stop_and_its_text_is_reported(
     moving: Reading, clock: FastClock
 ) -> None:
     moving.stop_error = StopFailed("HTTP 403")

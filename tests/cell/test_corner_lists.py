@@ -20,7 +20,7 @@ from cell.verbs.importing.importer import import_source
 from tests.cell.test_import import picture
 
 BOARD = Board("chessboard", 4, 5, 0.025)
-SAID = {"type": "chessboard", "rows": 4, "cols": 5, "square_m": 0.025}
+STATED = {"type": "chessboard", "rows": 4, "cols": 5, "square_m": 0.025}
 NAMES = ("left 1.png", "left 2.png")
 Corner = dict[str, FloatArray]
 
@@ -100,7 +100,7 @@ def test_a_list_is_named_as_the_board_is(
         for path in photos.iterdir():
             (source / path.name.replace(" ", "_")).write_bytes(path.read_bytes())
     WRITERS[file](tmp_path / file, written)
-    described = Described(board=SAID, corners=tmp_path / file)
+    described = Described(board=STATED, corners=tmp_path / file)
     imported = import_source(source, tmp_path / "r", described)
     assert (imported.frames, imported.with_corners) == (3, 2)
     assert f"by the pictures they stand {order} (2)" in " ".join(imported.guessed)
@@ -131,4 +131,4 @@ def test_a_list_that_cannot_be_is_refused(
 ) -> None:
     (tmp_path / "c.txt").write_text(text)
     with pytest.raises(InputError, match=message):
-        import_source(photos, tmp_path / "r", Described(board=SAID, corners=tmp_path / "c.txt"))
+        import_source(photos, tmp_path / "r", Described(board=STATED, corners=tmp_path / "c.txt"))

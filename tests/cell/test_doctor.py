@@ -108,7 +108,7 @@ def ur_cell(folder: Path, controller: URController) -> CellFile:
     return cell_with(folder, f"{{driver: ur, model: ur5e, address: {controller.address}}}")
 
 
-def test_a_ready_robot_is_told_as_ready(tmp_path: Path, ur: URController) -> None:
+def test_a_ready_robot_is_reported_as_ready(tmp_path: Path, ur: URController) -> None:
     ur.tcp_offset = (0.0, 0.0, 0.15, 0.0, 0.0, 0.0)
     findings = examine(ur_cell(tmp_path, ur))
     assert not [finding.line() for finding in findings if finding.blocks]
@@ -118,7 +118,7 @@ def test_a_ready_robot_is_told_as_ready(tmp_path: Path, ur: URController) -> Non
     assert "weigh camera and bracket" in by_name(findings, "payload").line()
 
 
-def test_polyscope_5_and_polyscope_x_are_told_apart(tmp_path: Path, ur: URController) -> None:
+def test_polyscope_5_and_polyscope_x_are_distinguished(tmp_path: Path, ur: URController) -> None:
     assert (
         "dashboard server: URSoftware 5.12"
         in by_name(examine(ur_cell(tmp_path, ur)), "UR controller").line()
@@ -213,7 +213,7 @@ def test_a_controller_that_does_not_watch_the_link_is_named(
     assert "a cut cable stops nothing" in without.line()
 
 
-def test_robotware_6_and_robotware_7_are_told_apart(tmp_path: Path, abb: ABBController) -> None:
+def test_robotware_6_and_robotware_7_are_distinguished(tmp_path: Path, abb: ABBController) -> None:
     assert "RobotWare 6" in by_name(examine(abb_cell(tmp_path, abb)), "ABB controller").line()
     arm = standing("irb140")
     with ABBController(arm, own_address(), omnicore=True) as newer:
@@ -250,7 +250,7 @@ def gige_cell(folder: Path, peer: GigEPeer, more: str = "") -> CellFile:
     return cell_with(folder, camera=f"{{driver: gige, address: {peer.address}{more}, model: eye")
 
 
-def test_a_gige_camera_tells_its_name_and_that_it_is_free(tmp_path: Path, gige: GigEPeer) -> None:
+def test_a_gige_camera_reports_its_name_and_that_it_is_free(tmp_path: Path, gige: GigEPeer) -> None:
     findings = examine(gige_cell(tmp_path, gige))
     assert "Eye1" in by_name(findings, "GigE camera").found
     assert by_name(findings, "GigE control").found == "free"
@@ -286,7 +286,7 @@ def test_a_camera_that_is_mute_is_in_the_way(tmp_path: Path, gige: GigEPeer) -> 
 
 
 @pytest.mark.parametrize("has_settings", [True, False])
-def test_a_robotiq_camera_whose_focus_cannot_be_locked_is_told(
+def test_a_robotiq_camera_whose_focus_cannot_be_locked_is_reported(
     tmp_path: Path, has_settings: bool
 ) -> None:
     source = CallableCamera(lambda camera: np.zeros((48, 64), np.uint8))

@@ -90,7 +90,7 @@ def sights(*views: tuple[float, float, float]) -> Sights:
 PLANNED = [(d, x, y) for d in (0.4, 0.55, 0.75, 0.9) for x, y in ((0, 0), (25, 0), (0, -25))]
 
 
-def test_distances_and_tilts_of_views_are_told() -> None:
+def test_distances_and_tilts_of_views_are_reported() -> None:
     seen = sights((0.5, 0, 0), (0.7, 20, 0), (0.9, 0, 30))
     np.testing.assert_allclose(seen.distance_m, [0.5, 0.7, 0.9])
     np.testing.assert_allclose(np.degrees(seen.tilt_rad), [0, 20, 30], atol=1e-6)

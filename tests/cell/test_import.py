@@ -48,7 +48,7 @@ def words(values: FloatArray) -> str:
 
 @pytest.mark.parametrize("rotation", WRITTEN)
 @pytest.mark.parametrize("scale", [1.0, 1e3])
-def test_poses_mean_what_they_are_said_to_mean(
+def test_poses_mean_what_they_are_stated_to_mean(
     tmp_path: Path, rotation: RotationName, scale: float
 ) -> None:
     file = tmp_path / "poses.txt"
@@ -200,7 +200,7 @@ def test_pictures_and_poses_that_do_not_match(tmp_path: Path) -> None:
         import_source(source, tmp_path / "r", stated)
 
 
-def test_what_is_missing_is_said(tmp_path: Path) -> None:
+def test_what_is_missing_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no folder of pictures"):
         import_source(tmp_path / "nowhere", tmp_path / "r", Described())
     with pytest.raises(InputError, match="has no pictures"):

@@ -20,7 +20,7 @@ from cell.errors import BadAnswer, InputError
 from cell.storage.recording import PoseRecord, Recording, read_recording
 from cell.verbs.calibrate import calibrate_recording
 from tests.cell import bags
-from tests.cell.bags import HAND, LATE_S, SAID, START_NS, STOPS, Message, T, Tour, write_bag
+from tests.cell.bags import HAND, LATE_S, START_NS, STATED, STOPS, Message, T, Tour, write_bag
 from tests.kinematics.made_up_arms import OFFSET_WRIST, urdf
 
 PICTURES = "/camera/image_raw"
@@ -45,14 +45,14 @@ def at_rest(tour: Tour, pictures: list[Message]) -> list[Message]:
 
 
 def _imported(bag: Path, out: Path, *options: str) -> tuple[dict[str, Any], Recording]:
-    arguments = ["import", str(bag), "--board", SAID, "-o", str(out), "--json", *options]
+    arguments = ["import", str(bag), "--board", STATED, "-o", str(out), "--json", *options]
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, (done.output, done.exception)
     return json.loads(done.stdout), read_recording(out)
 
 
 def _refused(bag: Path, out: Path, *options: str) -> str:
-    arguments = ["import", str(bag), "--board", SAID, "-o", str(out), *options]
+    arguments = ["import", str(bag), "--board", STATED, "-o", str(out), *options]
     done = CliRunner().invoke(app, arguments)
     assert isinstance(done.exception, InputError), (done.output, done.exception)
     return str(done.exception)
@@ -96,7 +96,7 @@ def test_sqlite_with_joints_alone_and_an_arm_by_its_name(
     bag = write_bag(tmp_path / "bag", content, StoragePlugin.SQLITE3)
     result, recording = _imported(bag, tmp_path / "out", "--robot", "ur5e")
     assert "made of the joints by the kinematics of ur5e" in _says(result, "poses are")
-    assert "do not tell" in _says(result, "clock")
+    assert "do not show" in _says(result, "clock")
     np.testing.assert_allclose(_poses(recording), tour.flange(_taken(at_rest)), atol=1e-9)
     joints = np.array([frame.joints_rad for frame in recording.frames])
     np.testing.assert_allclose(joints, tour.joints(_taken(at_rest)), atol=1e-9)
@@ -138,7 +138,7 @@ def test_the_mcap_library_s_file_with_the_arm_s_own_description(
             content |= {"header": _header(at), "data": message.data.tobytes()}
             put(topic, kind, at, content)
         writer.finish()
-    arguments = ["import", str(path), "--board", SAID, "-o", str(tmp_path / "out"), "--json"]
+    arguments = ["import", str(path), "--board", STATED, "-o", str(tmp_path / "out"), "--json"]
     done = CliRunner().invoke(app, arguments)
     assert isinstance(done.exception, BadAnswer)
     assert "robot_description from base_link to tool0" in _says(json.loads(done.stdout), "the arm")
@@ -179,7 +179,7 @@ def test_pictures_alone_are_a_recording_without_poses(
     assert len(recording.frames) == STOPS
 
 
-def test_what_is_not_told_is_asked_for_with_the_list(
+def test_what_is_not_stated_is_asked_for_with_the_list(
     tour: Tour, at_rest: list[Message], tmp_path: Path
 ) -> None:
     """Two cameras, two arms; a depth camera and the same pictures compressed are no question."""

@@ -1,4 +1,4 @@
-"""Poses in the layouts that people have: understood from names, numbers and pictures, and told."""
+"""Poses in the layouts that people have: read by names, numbers and pictures, and reported."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def read(
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_a_layout_is_understood_and_said_aloud(tmp_path: Path, name: str) -> None:
+def test_a_layout_is_understood_and_reported(tmp_path: Path, name: str) -> None:
     layout = LAYOUTS[name]
     path = layout.write(tmp_path, FLANGE)
     stated = StatedConvention(layout.stated.get("rotation"))
@@ -105,7 +105,7 @@ def concluded(
     return read(tmp_path / "p.txt", pictures, stated, check(), **more)[1]
 
 
-def test_what_is_said_wrongly_is_taken_and_contradicted(tmp_path: Path) -> None:
+def test_what_is_stated_wrongly_is_taken_and_contradicted(tmp_path: Path) -> None:
     text = table(P_M, XYZW)
     found = concluded(tmp_path, text, StatedConvention("quat_wxyz", "m", False))
     assert found.rotation == "quat_wxyz"
@@ -141,7 +141,7 @@ def test_a_square_that_contradicts_the_poses_is_refused_with_the_one_that_fits(
         read(tmp_path / "p.txt", pictures, StatedConvention(), typed_check, typed)
 
 
-def test_a_unit_said_wrongly_is_contradicted(tmp_path: Path) -> None:
+def test_a_unit_stated_wrongly_is_contradicted(tmp_path: Path) -> None:
     found = concluded(tmp_path, table(P_M, XYZW), StatedConvention(unit="mm"))
     assert found.unit == "mm"
     assert any("by a factor of" in words for words in found.contradicted)
@@ -158,14 +158,14 @@ def test_mirrored_pictures_are_refused_as_such(tmp_path: Path) -> None:
         read(tmp_path / "p.txt", pictures, check=rough.closure)
 
 
-def test_pictures_that_cannot_tell_leave_the_question_to_the_user(tmp_path: Path) -> None:
+def test_undecided_pictures_leave_the_question_to_the_user(tmp_path: Path) -> None:
     still = np.repeat(TURNS[:1].as_rotvec(), FRAMES, axis=0)
     (tmp_path / "p.txt").write_text(table(P_M, still))
 
     def no_turn(poses: FloatArray) -> Closure:
         return Closure(0.0, 0.0, 1.0)
 
-    with pytest.raises(InputError, match="nothing tells which"):
+    with pytest.raises(InputError, match="nothing shows which"):
         read(tmp_path / "p.txt", [f"{n}.png" for n in range(FRAMES)], check=no_turn)
 
 

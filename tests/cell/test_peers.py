@@ -107,7 +107,9 @@ def test_the_peers_end_with_the_run_that_fails(tmp_path: Path) -> None:
     assert not multiprocessing.active_children()
 
 
-def test_addresses_that_are_taken_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_addresses_that_are_taken_are_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     plan = short_plan(tmp_path, "ur3-robotiq", 1, "robotiq_wrist")
     address = own_address()
     monkeypatch.setattr(cell.devices.peers, "own_address", lambda: address)
@@ -120,7 +122,7 @@ def test_addresses_that_are_taken_are_told(tmp_path: Path, monkeypatch: pytest.M
         pass
 
 
-def test_a_missing_aravis_is_told_before_anything_starts(
+def test_a_missing_aravis_is_reported_before_anything_starts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = short_plan(tmp_path, "ur3-robotiq", 1, "gige_camera")

@@ -253,7 +253,7 @@ def bench(**changes: str) -> CellFile:
     return CellFile.model_validate(YAML(typ="safe").load(text))
 
 
-def test_what_a_plan_needs_is_said() -> None:
+def test_what_a_plan_needs_is_reported() -> None:
     with pytest.raises(InputError, match=r"write layout\.alpha_px, or camera\.lens"):
         design_plan(bench())
     without = bench().model_copy(update={"layout": None})
@@ -261,7 +261,7 @@ def test_what_a_plan_needs_is_said() -> None:
         design_plan(without)
 
 
-def test_a_board_out_of_reach_is_said() -> None:
+def test_a_board_out_of_reach_is_reported() -> None:
     cell = bench()
     assert cell.layout is not None
     far = cell.layout.fixed.model_copy(update={"p_m": (3.0, 0.0, 0.0)})
@@ -275,7 +275,7 @@ def test_a_board_out_of_reach_is_said() -> None:
 
 
 @pytest.mark.parametrize("by_hand", [False, True])
-def test_a_board_too_large_for_the_picture_is_said(by_hand: bool) -> None:
+def test_a_board_too_large_for_the_picture_is_reported(by_hand: bool) -> None:
     """There is no view to wait for: a plan for a lens so long once never came."""
     cell = read_cell(CONFIGS / "ur3-robotiq.cell.yaml")
     data = cell.model_dump(by_alias=True, mode="json")
@@ -295,7 +295,7 @@ def test_the_cell_of_the_documentation_can_be_planned() -> None:
     assert "not in view from home" not in words
 
 
-def test_less_than_was_asked_for_is_said_with_the_reason() -> None:
+def test_less_than_was_asked_for_is_reported_with_the_reason() -> None:
     plan = read_plan(CONFIGS / "ur3-robotiq.plan.yaml")
     assert shortfalls(plan, PlanSize(10, 30)) == ()
     fewer, why = shortfalls(plan, PlanSize(16, 30))

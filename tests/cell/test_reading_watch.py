@@ -45,7 +45,7 @@ def falsified(bench: Bench, when: WhenAt, falsify: Falsify) -> None:
     def state() -> ArmState:
         if not on:
             return read()
-        bench.clock.sleep(0.001)  # a controller tells nothing else at the same time
+        bench.clock.sleep(0.001)  # a controller reports nothing else at the same time
         return falsify(read())
 
     bench.arm.state = state  # type: ignore[method-assign]
@@ -124,7 +124,7 @@ def test_a_flange_faster_than_the_plan_is_stopped(bench: Bench) -> None:
     stopped_for(bench, "the plan allows 0.2 m/s")
 
 
-def test_a_joint_told_to_be_faster_than_its_move_is_stopped(bench: Bench) -> None:
+def test_a_joint_ordered_to_be_faster_than_its_move_is_stopped(bench: Bench) -> None:
     fast = (0.0, 0.0, 0.0, 0.0, 2.0, 0.0)
     falsified(
         bench,
@@ -135,7 +135,7 @@ def test_a_joint_told_to_be_faster_than_its_move_is_stopped(bench: Bench) -> Non
 
 
 @pytest.mark.parametrize("clock", [True, False], ids=["clocked", "no clock"])
-def test_a_joint_that_is_faster_than_its_move_is_stopped_though_no_speed_is_told(
+def test_a_joint_that_is_faster_than_its_move_is_stopped_though_no_speed_is_reported(
     tmp_path: Path, clock: bool
 ) -> None:
     """As Robot Web Services do; a wrist that turns moves neither flange nor camera."""
@@ -156,7 +156,7 @@ def test_a_joint_that_is_faster_than_its_move_is_stopped_though_no_speed_is_told
 
 
 def old(bench: Bench) -> Falsify:
-    """Values as they were on the way, told anew with the clock going on."""
+    """Values as they were on the way, reported anew with the clock going on."""
     kept: list[ArmState] = []
 
     def falsify(state: ArmState) -> ArmState:
@@ -211,7 +211,7 @@ def test_a_leap_farther_than_the_arm_can_go_is_not_believed(bench: Bench) -> Non
     stopped_for(bench, "joint 4 jumped by 28.6°")
 
 
-def test_a_stop_by_itself_that_drifts_is_never_told_as_standing(bench: Bench) -> None:
+def test_a_stop_by_itself_that_drifts_is_never_reported_as_standing(bench: Bench) -> None:
     def drifting(state: ArmState) -> ArmState:
         sag = np.array([0.0, 0.02 * bench.clock.now(), 0.0, 0.0, 0.0, 0.0])
         fault = replace(state, motion=Motion.STOPPED_BY_FAULT, fault="protective stop")

@@ -142,7 +142,7 @@ def test_image_that_is_not_an_image(recording_folder: Folder) -> None:
         recording.image(recording.frames[1])
 
 
-def test_size_comes_from_a_picture_where_the_header_does_not_tell(recording_folder: Folder) -> None:
+def test_size_comes_from_a_picture_where_the_header_has_none(recording_folder: Folder) -> None:
     header = HEADER.replace("width: 64, height: 48, ", "width: null, height: null, ")
     folder = recording_folder(header=header, frames=frame_line(0, image="a.png"))
     cv2.imwrite(str(folder / "a.png"), np.zeros((30, 40), np.uint8))

@@ -43,7 +43,7 @@ def test_a_run_on_another_arm_ends_before_its_first_move(tmp_path: Path, name: s
     assert "move" not in bench.arm.calls
 
 
-def test_both_names_are_told(tmp_path: Path) -> None:
+def test_both_names_are_reported(tmp_path: Path) -> None:
     bench = Bench(tmp_path)
     bench.arm = OtherArm(bench.clock.now, "ur5e", says="UR10")
     result = bench.run()
@@ -70,7 +70,7 @@ def test_sizes_are_compared_not_letters(named: str, says: str | None, differ: bo
 
 
 def test_a_factory_calibration_is_no_other_arm() -> None:
-    """Offsets as large as a public UR10e's; the other models are told apart at the same joints."""
+    """Offsets as large as a public UR10e's; the other models differ at the same joints."""
     robot = arm("ur10e")
     offset = np.zeros((6, 5))
     offset[:, 0] = [0, 2e-3, -3e-3, 1e-3, 1e-3, 0]

@@ -46,7 +46,7 @@ NO_BOARD = "checks: {board: false}\n"
 
 
 class Listener(Watcher):
-    """Keeps what it is told."""
+    """Keeps what it is sent."""
 
     def __init__(self) -> None:
         self.statuses: list[Status] = []
@@ -451,7 +451,7 @@ def test_a_frame_older_than_the_standstill_is_refused(bench: Bench) -> None:
     assert "lies outside the time the arm stood still" in result.skipped[0]
 
 
-def test_an_arm_that_tells_its_pose_seldom_is_waited_for(bench: Bench) -> None:
+def test_an_arm_that_reports_its_pose_seldom_is_waited_for(bench: Bench) -> None:
     bench.arm.reports_every_s = 0.2
     assert bench.run().finish is Finish.COMPLETED
     for frame in read_recording(bench.folder).frames:

@@ -1,4 +1,4 @@
-"""Every effect of the catalogue: absent it changes nothing, present it does; and it tells all."""
+"""Every effect of the catalogue: absent it changes nothing, present it does; it describes all."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -161,7 +161,7 @@ def test_files_write_effects_by_name_law_and_numbers() -> None:
         ("empirical", {"law": "nowhere/time", "c0_k1": 1.0}, "nowhere"),
     ],
 )
-def test_a_wrong_name_is_told_with_those_that_exist(
+def test_a_wrong_name_is_reported_with_those_that_exist(
     name: str, given: dict[str, float | str], reported: str
 ) -> None:
     with pytest.raises(KeyError) as caught:

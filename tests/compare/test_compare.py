@@ -85,7 +85,7 @@ def _moved(side: Side, **changes: float) -> Side:
     return replace(side, values=values)
 
 
-def test_a_focal_length_off_by_a_thousandth_is_told_in_pixels_and_millimetres() -> None:
+def test_a_focal_length_off_by_a_thousandth_is_reported_in_pixels_and_millimetres() -> None:
     a = _calibrated(1)
     share = 1e-3
     found = compare(a, _moved(a, alpha=share * a.values[0], beta=share * a.values[1]))
@@ -129,7 +129,7 @@ def test_without_covariances_it_says_that_chance_is_a_guess() -> None:
     assert found.camera.beyond_chance is False
 
 
-def test_an_uncertainty_that_its_own_frames_call_too_small_is_told() -> None:
+def test_an_uncertainty_that_its_own_frames_call_too_small_is_reported() -> None:
     sure = replace(_calibrated(1), label="new", too_sure=2.6)
     notes = " ".join(compare(_calibrated(1), sure).notes)
     assert "new: its own frames ask for up to 2.6 times the uncertainty it states" in notes

@@ -48,7 +48,7 @@ def test_each_slot_takes_one_of_its_own_and_none_is_taken_twice() -> None:
     assert choose_views(CRITERION, [ALL[:0], ends]) in ((0,), (40,))
 
 
-def test_what_is_expected_is_what_a_fit_of_such_views_tells() -> None:
+def test_what_is_expected_is_what_a_fit_of_such_views_reports() -> None:
     lens = make_effect("focus_breathing", {"law": "thin_lens", "f_m": 0.012})
     true = plain_cell().with_effects([lens])
     views = record(true, log(24), seed=3)
@@ -60,7 +60,7 @@ def test_what_is_expected_is_what_a_fit_of_such_views_tells() -> None:
 
 
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
-def test_the_needs_are_what_the_report_will_tell(mount: str) -> None:
+def test_the_needs_are_what_the_report_will_show(mount: str) -> None:
     views = record(plain_cell(), log(24), seed=3)
     lens = make_effect("focus_breathing", {"law": "thin_lens"})
     expected = expect(plain_cell(), [lens], views, NOISE)

@@ -114,7 +114,7 @@ def record(model: CellModel, views: Views, seed: int, noise: Noise = NOISE) -> V
 
 
 def recording() -> Recording:
-    """What a recording of these runs tells of itself; it has no files."""
+    """What a recording of these runs says of itself; it has no files."""
     header = Header.model_validate(
         {
             "schema": "cell.recording/1",

@@ -1,4 +1,4 @@
-"""Names that rest on little are not told: beside a dent, and on branches that were guessed."""
+"""Names that rest on little are not reported: beside a dent, and on branches that were guessed."""
 
 from __future__ import annotations
 

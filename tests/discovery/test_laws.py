@@ -1,4 +1,4 @@
-"""Physics that nobody has named: the law is found, carried by the twin, and told."""
+"""Physics that nobody has named: the law is found, carried by the twin, and reported."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_the_blocks_say_of_an_effect_what_its_score_test_says():
     assert found[0].gain == pytest.approx(score.gain, rel=1e-3)
 
 
-def test_a_law_is_told_with_its_equation_and_predicts_frames_never_shown():
+def test_a_law_is_reported_with_its_equation_and_predicts_frames_never_shown():
     numbers = {"slope_u_px": 0.2, "slope_v_px": -0.1, "low_1": 0.0, "high_1": 18.0}
     found = diagnose(made("linear:principal_point.u_px+v_px/gain_db", seed=4, **numbers))
     assert found.verdict == "unexplained"

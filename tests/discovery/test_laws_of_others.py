@@ -43,7 +43,7 @@ def test_a_focal_length_that_turns_back_with_the_distance_is_focus_breathing():
 
 
 @pytest.mark.parametrize("name", ["thermal_focal_drift", "thermal_mount_drift"])
-def test_a_drift_told_of_some_frames_holds_for_the_others(name):
+def test_a_drift_found_in_some_frames_holds_for_the_others(name):
     amount = "relative" if name == "thermal_focal_drift" else "x_m"
     drift = make_effect(name, {amount: 1e-3, "tau_s": 200.0, "start_s": float(LOG.t_s[0])})
     model = plain_cell().with_effects([drift])

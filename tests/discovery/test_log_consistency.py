@@ -13,7 +13,7 @@ from calib.chain.kinematics import arm
 from calib.discovery.log_consistency.mixup import Mixup
 from calib.discovery.log_repair import LogRepair, repair_log
 from calib.views import FloatArray, Views
-from cell.devices.log_mixups import _scalar_first, slip
+from cell.devices.log_mixups import _scalar_first, mix_up
 from cell.storage.files.cell_file import EffectFile
 from tests.discovery.simulated_runs import BOARD, log, plain_cell, record
 
@@ -22,7 +22,7 @@ CLEAN = record(plain_cell(), log(30), seed=41)
 
 def mixed_up(name: str, **parameters: float) -> Views:
     effect = EffectFile(name=name, parameters=parameters)
-    return slip(CLEAN, effect, np.random.default_rng(3))
+    return mix_up(CLEAN, effect, np.random.default_rng(3))
 
 
 def log_repair_of(views: Views) -> LogRepair:
@@ -108,7 +108,7 @@ def true_poses(rows: list[int] | np.ndarray) -> FloatArray:
 
 
 @pytest.mark.parametrize("late", [1, 2])
-def test_a_run_of_stale_pictures_is_told_with_where_it_starts_and_ends(late):
+def test_a_run_of_stale_pictures_is_reported_with_where_it_starts_and_ends(late):
     rows = np.arange(len(CLEAN))
     rows[8:21] -= late
     found = log_repair_of(with_pictures(rows))
@@ -120,7 +120,7 @@ def test_a_run_of_stale_pictures_is_told_with_where_it_starts_and_ends(late):
     np.testing.assert_allclose(found.views.base_from_flange, true_poses(rows))
 
 
-def test_a_picture_that_was_written_twice_is_told():
+def test_a_picture_that_was_written_twice_is_reported():
     rows = np.arange(len(CLEAN))
     rows[12] = 11
     found = log_repair_of(with_pictures(rows))
@@ -130,7 +130,7 @@ def test_a_picture_that_was_written_twice_is_told():
     np.testing.assert_allclose(found.views.base_from_flange, true_poses(rows))
 
 
-def test_pictures_that_ran_ahead_at_the_end_are_told_one_by_one():
+def test_pictures_that_ran_ahead_at_the_end_are_reported_one_by_one():
     rows = np.arange(len(CLEAN))
     rows[-3:-1] += 1
     found = log_repair_of(with_pictures(rows))
@@ -149,7 +149,7 @@ def test_an_offset_of_more_than_half_of_the_frames_is_one_of_those_frames():
     np.testing.assert_allclose(found.views.base_from_flange, true_poses(rows))
 
 
-def test_a_pose_that_froze_is_told_and_its_frames_are_left_out():
+def test_a_pose_that_froze_is_reported_and_its_frames_are_left_out():
     poses = CLEAN.base_from_flange.copy()
     poses[12:20] = poses[11]
     found = log_repair_of(replace(CLEAN, base_from_flange=poses))
@@ -161,7 +161,7 @@ def test_a_pose_that_froze_is_told_and_its_frames_are_left_out():
 
 @pytest.mark.parametrize("at", [9, 21])
 @pytest.mark.parametrize("side", ["tool", "base"])
-def test_a_tool_or_base_frame_that_was_set_midway_is_told_with_frame_and_size(side, at):
+def test_a_tool_or_base_frame_that_was_set_midway_is_reported_with_frame_and_size(side, at):
     change = rigid.from_vector(np.array([0.01, -0.02, 0.12, 0.0, 0.3, 0.1]))
     poses = CLEAN.base_from_flange.copy()
     poses[at:] = poses[at:] @ change if side == "tool" else change @ poses[at:]
@@ -180,7 +180,7 @@ def test_joints_in_degrees_are_read_as_such():
 
 
 @pytest.mark.parametrize("turned", [[2], [1, 4]])
-def test_the_sign_of_a_joint_is_told_by_the_poses(turned):
+def test_the_sign_of_a_joint_is_found_from_the_poses(turned):
     joints = CLEAN.joints_rad.copy()
     joints[:, turned] *= -1.0
     found = log_repair_of(replace(CLEAN, joints_rad=joints))
@@ -190,7 +190,7 @@ def test_the_sign_of_a_joint_is_told_by_the_poses(turned):
 
 
 @pytest.mark.parametrize(("wrote", "took"), [("ZYX", "xyz"), ("XYZ", "xyz")])
-def test_angles_written_in_another_order_than_they_were_read_are_told(wrote, took):
+def test_angles_written_in_another_order_than_they_were_read_are_reported(wrote, took):
     true = Rotation.from_matrix(CLEAN.base_from_flange[:, :3, :3])
     poses = CLEAN.base_from_flange.copy()
     poses[:, :3, :3] = Rotation.from_euler(took, true.as_euler(wrote)).as_matrix()
@@ -204,7 +204,7 @@ def test_poses_of_which_nobody_knows_who_carries_the_camera_leave_both_readings(
     assert only(found).alike == ("mount",)
 
 
-def test_a_single_position_in_another_unit_is_told():
+def test_a_single_position_in_another_unit_is_reported():
     poses = CLEAN.base_from_flange.copy()
     poses[[5, 6, 14], :3, 3] *= 1e3
     found = log_repair_of(replace(CLEAN, base_from_flange=poses))
@@ -213,7 +213,7 @@ def test_a_single_position_in_another_unit_is_told():
     np.testing.assert_allclose(found.views.base_from_flange, CLEAN.base_from_flange, atol=1e-12)
 
 
-def test_mirrored_pictures_are_told_and_set_right():
+def test_mirrored_pictures_are_reported_and_set_right():
     corners = CLEAN.corners_px.copy()
     corners[..., 0] = CLEAN.width_px - 1.0 - corners[..., 0]
     found = log_repair_of(replace(CLEAN, corners_px=corners))
@@ -221,7 +221,7 @@ def test_mirrored_pictures_are_told_and_set_right():
     np.testing.assert_allclose(found.views.corners_px, CLEAN.corners_px, atol=1e-9)
 
 
-def test_frames_numbered_from_another_end_of_the_board_are_told_and_renumbered():
+def test_frames_numbered_from_another_end_of_the_board_are_reported_and_renumbered():
     corners = CLEAN.corners_px.reshape(len(CLEAN), BOARD.rows, BOARD.cols, 2).copy()
     corners[4], corners[9] = corners[4, ::-1, ::-1], corners[9, :, ::-1]
     found = log_repair_of(replace(CLEAN, corners_px=corners.reshape(CLEAN.corners_px.shape)))

@@ -93,7 +93,7 @@ def smooth_arm() -> Views:
     return record(plain_cell().with_effects([field]), LOG, 19)
 
 
-def test_an_arm_that_errs_smoothly_over_its_joints_is_told_and_a_sound_one_is_not():
+def test_an_arm_that_errs_smoothly_over_its_joints_is_reported_and_a_sound_one_is_not():
     views = smooth_arm()
     found = find_arm_field(Fitter(views).fit(plain_cell(), NOISE), views)
     assert found is not None

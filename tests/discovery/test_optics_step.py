@@ -32,7 +32,7 @@ def changed(at: int, scale: float, shift_px: tuple[float, float]) -> Views:
     ("at", "scale", "shift_px"),
     [(8, 0.5, (0.0, 0.0)), (16, 0.5, (0.0, 0.0)), (25, 1.0, (-300.0, -200.0)), (16, 2.0, (0, 0))],
 )
-def test_binning_and_region_are_told_by_the_pictures_alone(at, scale, shift_px):
+def test_binning_and_region_are_found_from_the_pictures_alone(at, scale, shift_px):
     views = changed(at, scale, shift_px)
     found = find_picture_step(views, fit_baseline(views, usable_frames(views)))
     assert found is not None

@@ -68,7 +68,7 @@ def test_an_effect_of_the_smallest_size_is_found_nine_times_in_ten():
     assert 0.5 < np.std(scores) < 1.6
 
 
-def test_mirror_images_are_told_with_the_experiment_that_parts_them():
+def test_mirror_images_are_reported_with_the_experiment_that_parts_them():
     pairs = {frozenset((e.effect.label, r.label)): r for e, r in alike(POWER)}
     scale = pairs[frozenset({"board_scale", "link_geometry"})]
     assert scale.mirror
@@ -93,7 +93,7 @@ def test_more_noise_of_the_arm_hides_the_arm_and_leaves_the_board():
     assert growth("board_warp") < 1.6
 
 
-def test_the_verb_tells_it_of_a_cell_and_of_a_plan():
+def test_the_verb_reports_it_of_a_cell_and_of_a_plan():
     run = CliRunner().invoke
     plan = run(app, ["plan", "--power", str(CONFIGS / "ur3-robotiq.plan.yaml"), "--json"])
     reported = json.loads(plan.stdout)
@@ -104,10 +104,10 @@ def test_the_verb_tells_it_of_a_cell_and_of_a_plan():
     assert {"entrance_pupil_shift", "protective_window"} in names
     text = run(app, ["plan", "--power", str(CONFIGS / "ur3-robotiq.plan.yaml")])
     assert text.exit_code == 0
-    assert "could not be told apart" in text.stdout
+    assert "could not be distinguished" in text.stdout
 
 
-def test_a_cell_that_tells_nothing_of_its_layout_is_refused_in_words(tmp_path):
+def test_a_cell_without_anything_of_its_layout_is_refused_in_words(tmp_path):
     whole = (CONFIGS / "ur3-robotiq.cell.yaml").read_text()
     path = tmp_path / "bare.cell.yaml"
     path.write_text(whole[: whole.index("layout:")])

@@ -32,7 +32,7 @@ def gated(views: Views, held: Views, *effects):
     return structure, dropped, before, after
 
 
-def test_numbers_that_only_fit_are_dropped_and_it_is_said():
+def test_numbers_that_only_fit_are_dropped_and_it_is_reported():
     views = record(plain_cell(), LOG, 31)
     structure, dropped, before, after = gated(views.take(np.arange(9)), views, EVERY_LENGTH)
     assert structure.search.best.fit.model.effects == ()
@@ -53,7 +53,7 @@ def test_of_two_the_one_that_predicts_worse_goes_and_the_true_one_stays():
     assert after.rms_px < 0.5 * before.rms_px
 
 
-def test_unseen_frames_have_a_say_beyond_chance():
+def test_unseen_frames_have_weight_beyond_chance():
     plain = Missed(np.ones(8), np.ones(4))
     assert not replace(plain, left_out=np.full(8, 0.5)).worse_than(plain)
     assert replace(plain, left_out=np.full(8, 1.1)).worse_than(plain)

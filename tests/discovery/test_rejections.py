@@ -23,7 +23,7 @@ def test_a_few_are_chance(frames):
 @pytest.mark.parametrize(
     "frames", [[117, 118, 119], [101, 104, 109, 114, 120, 126], list(range(116, 132))]
 )
-def test_a_run_or_many_are_a_finding_told_with_where_they_stand(frames):
+def test_a_run_or_many_are_a_finding_reported_with_where_they_stand(frames):
     found = lost_frames(rejected(frames), FRAMES)
     assert found is not None
     assert f"{len(frames)} frames between {frames[0]} and {frames[-1]}" in found.where

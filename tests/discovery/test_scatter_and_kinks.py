@@ -1,4 +1,4 @@
-"""Chance and kinks look like physics to a smooth curve; they are told for what they are."""
+"""Chance and kinks look like physics to a smooth curve; they are reported for what they are."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_the_joint_fit_finds_every_frame_s_focal_error_and_leaves_the_arm_its_ow
     assert np.corrcoef(fit.own_error[:, 6], true)[0, 1] > 0.97
 
 
-def test_a_focal_length_that_scatters_by_chance_is_told_as_that_and_nothing_is_named_for_it():
+def test_a_focal_length_that_scatters_by_chance_is_reported_as_that_and_nothing_is_named_for_it():
     found = diagnose(with_focus_by_chance(72)[0])
     assert found.verdict == "unexplained"
     assert found.effects == ()

@@ -1,4 +1,4 @@
-"""Plans that tell two rivals apart: worth it, reachable, and none where poses cannot."""
+"""Plans that distinguish two rivals: worth it, reachable, and none where poses cannot."""
 
 from __future__ import annotations
 

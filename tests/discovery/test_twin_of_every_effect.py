@@ -63,7 +63,7 @@ def found(label: str) -> Diagnosis:
 
 
 def misses(label: str) -> FloatArray:
-    """Fitted minus true amounts, in the sigmas told."""
+    """Fitted minus true amounts, in the sigmas reported."""
     present = truth(EFFECTS[label])
     (named,) = found(label).effects
     return np.array(

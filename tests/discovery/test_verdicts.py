@@ -122,14 +122,14 @@ def without(*columns: str) -> Views:
     return replace(CLEAN, **{name: np.full_like(getattr(CLEAN, name), np.nan) for name in columns})
 
 
-def test_joints_that_were_not_logged_are_worked_out_and_that_is_said():
+def test_joints_that_were_not_logged_are_worked_out_and_that_is_reported():
     bare = without("joints_rad", "joint_velocity_rad_s", "approach_joints_rad")
     repaired = repair_log(bare, bare)
     assert np.isfinite(repaired.views.joints_rad).all()
     assert "joints" in " ".join(repaired.notes)
 
 
-def test_without_times_what_drifts_is_said_to_be_out_of_sight():
+def test_without_times_what_drifts_is_reported_as_out_of_sight():
     found = diagnose(without("t_s", "temperature_c"))
     assert found.verdict == "consistent"
     notes = " ".join(found.notes)

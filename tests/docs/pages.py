@@ -38,7 +38,7 @@ def blocks(page: Path) -> list[Block]:
 
 
 def run_python(code: str, line: int, page: Path, names: dict[str, Any]) -> str:
-    """What a block prints; errors tell the page's own lines."""
+    """What a block prints; errors say the page's own lines."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(compile("\n" * line + code, str(page), "exec"), names)

@@ -60,7 +60,7 @@ def test_importing_calib_loads_nothing_heavy() -> None:
         ((5, 70, 2), {"joints": (5, 6)}, "joints is not a column; known are frame, corners_px"),
     ],
 )
-def test_arrays_of_the_wrong_shape_are_told(
+def test_arrays_of_the_wrong_shape_are_reported(
     shape: tuple[int, ...], logged: dict[str, tuple[int, ...]], words: str
 ) -> None:
     import numpy as np

@@ -1,4 +1,4 @@
-"""Where camera and board are, as robots and ROS are told: read back, in the direction said."""
+"""Where camera and board are, as robots and ROS need it: read back, in the direction stated."""
 
 from __future__ import annotations
 

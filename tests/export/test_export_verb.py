@@ -136,7 +136,7 @@ def test_a_distance_without_a_focal_length_is_refused(distance_m: float, tmp_pat
         _export(tmp_path, MOVING, "opencv", distance_m=distance_m)
 
 
-def test_an_older_file_without_the_image_s_size_is_told_apart(tmp_path: Path) -> None:
+def test_an_older_file_without_the_image_s_size_is_distinguished(tmp_path: Path) -> None:
     content = {key: value for key, value in STILL.items() if key != "image_size_px"}
     with pytest.raises(InputError, match="does not state the image's size"):
         _export(tmp_path, content, "kalibr")
@@ -155,7 +155,7 @@ def test_an_older_file_without_the_image_s_size_is_told_apart(tmp_path: Path) ->
         ('{"schema": "cell.calibration/1", "solutions": {}}', "has no solutions"),
     ],
 )  # fmt: skip
-def test_unusable_files_are_told_with_the_place(text: str, words: str, tmp_path: Path) -> None:
+def test_unusable_files_are_reported_with_the_place(text: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / "calibration.json"
     path.write_text(text)
     with pytest.raises(InputError, match=words):
@@ -180,7 +180,7 @@ def test_a_missing_file_is_named_once(tmp_path: Path) -> None:
     assert str(refused.exception).count(str(path)) == 1
 
 
-def test_the_verb_tells_the_file_in_its_refusals(tmp_path: Path) -> None:
+def test_the_verb_reports_the_file_in_its_refusals(tmp_path: Path) -> None:
     path = write(tmp_path, MOVING)
     for arguments, words in (
         (["--format", "ros"], f"{path}: the focal length follows the distance"),

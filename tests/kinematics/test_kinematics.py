@@ -172,7 +172,7 @@ def test_a_free_wrist_stays_where_it_is(name, joints):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_out_of_reach_is_said_with_the_place(name):
+def test_out_of_reach_is_reported_with_the_place(name):
     far = np.eye(4)
     far[:3, 3] = [2.5, 0.0, 0.4]
     assert len(arm(name).inverse_all(far)) == 0

@@ -1,4 +1,4 @@
-"""The page's server from outside: who is let in, what is told, and that no run waits for it."""
+"""The page's server from outside: who is let in, what is reported, and that no run waits for it."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_a_bad_address_touches_no_recording(tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
-def test_a_taken_port_is_told(url: str) -> None:
+def test_a_taken_port_is_reported(url: str) -> None:
     with pytest.raises(InputError, match="cannot listen there"):
         Address("127.0.0.1", urlsplit(url).port or 0, "").listen()
 
@@ -159,7 +159,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_may_not_be_framed(url: str) -
     assert "emergency stop" not in re.sub(r"not an emergency stop", "", body.lower())
 
 
-# -- what is told
+# -- what is reported
 
 
 def test_a_new_browser_hears_everything_at_once(live: LiveRun, url: str, tmp_path: Path) -> None:
@@ -220,7 +220,7 @@ def test_a_picture_of_twelve_bits_shows_what_is_saturated() -> None:
     assert shown[5, 1000] > 250
 
 
-def test_a_run_that_hangs_is_told_as_hanging(
+def test_a_run_that_hangs_is_reported_as_hanging(
     live: LiveRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     live.status_changed(status(State.MOVING))
@@ -259,7 +259,7 @@ def test_after_the_run_the_buttons_say_so(live: LiveRun, url: str) -> None:
     assert press(url, "stop") == (409, "The run is over; the arm was let go of.")
 
 
-def test_how_it_ended_is_told_with_the_files_there_are(live: LiveRun, url: str) -> None:
+def test_how_it_ended_is_reported_with_the_files_there_are(live: LiveRun, url: str) -> None:
     live.recorded(RunResult(Finish.COMPLETED, "", 12, {}, ended_early="alpha is known"))
     live.ended("completed: 12 frames", {"report": "runs/monday/report.html"})
     end = events(url, {"end"})["end"]
@@ -299,7 +299,7 @@ def test_too_many_followers_leave_the_stop_alone(live: LiveRun, url: str) -> Non
         follower.close()
 
 
-def test_a_page_that_cannot_tell_ends_its_stream_and_nothing_else(
+def test_a_page_that_cannot_show_ends_its_stream_and_nothing_else(
     live: LiveRun, url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken() -> dict[str, object]:

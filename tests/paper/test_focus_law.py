@@ -45,7 +45,7 @@ def test_a_constant_is_kept_and_rarely_mistaken() -> None:
     assert kept >= 97
 
 
-def test_a_lens_that_obeys_no_law_on_offer_is_told() -> None:
+def test_a_lens_that_obeys_no_law_on_offer_is_reported() -> None:
     scale, sigma = _noisy(4755.8 - 60 * np.exp(-(((DISTANCE - 0.8) / 0.15) ** 2)))
     choice = choose_focus_law(DISTANCE, scale, sigma)
     assert choice is not None

@@ -50,7 +50,7 @@ def test_sigma_covers_the_truth() -> None:
     assert 0.7 < np.sqrt(np.mean(np.square(pulls))) < 1.4
 
 
-def test_pure_translation_and_one_axis_are_told() -> None:
+def test_pure_translation_and_one_axis_are_reported() -> None:
     true = mixed_scene()
     flange = np.tile(np.eye(4), (10, 1, 1))
     flange[:, :3, 3] = np.random.default_rng(0).normal(0, 0.2, (10, 3))
@@ -81,7 +81,7 @@ def test_position_error_is_positive_in_z_when_the_camera_is_computed_too_close()
     assert np.allclose(error, [0.0, 0.0, 0.1])
 
 
-def test_a_log_in_millimetres_is_told() -> None:
+def test_a_log_in_millimetres_is_reported() -> None:
     true = mixed_scene()
     flange = true.views.base_from_flange.copy()
     flange[:, :3, 3] *= 1000

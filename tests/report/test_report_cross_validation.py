@@ -1,4 +1,4 @@
-"""The report tells what cross-validation found, or why there is none."""
+"""The report states what cross-validation found, or why there is none."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_frames_that_carry_an_estimate_are_listed() -> None:
     assert '<th scope="row">frame 17</th><td>focal length α</td><td>2.3</td>' in page
 
 
-def test_without_it_the_reason_is_told() -> None:
+def test_without_it_the_reason_is_reported() -> None:
     content = _content(cross_validation=None, missing={"cross_validation": "9 frames took part"})
     reported = "Not cross-validated: 9 frames took part."
     assert reported in _page(content)

@@ -1,4 +1,4 @@
-"""The report tells the camera's own uncertainty and what the views cannot tell apart."""
+"""The report states the camera's own uncertainty and what the views cannot distinguish."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def test_what_is_not_separable_stands_on_the_first_screen_and_in_its_section() -
         assert weak["separate_with"] in words
 
 
-def test_views_that_tell_all_apart_are_said_to() -> None:
+def test_views_that_distinguish_all_are_reported_so() -> None:
     spread = json.loads(_written(0.3, 1.0))
     assert spread["not_separable"] == []
     page = uncertainty(replace(_data(), calibration=spread))
-    assert "tell all fitted quantities apart" in page
-    assert "hardly tell apart" not in " ".join(sentences(replace(_data(), calibration=spread)))
+    assert "distinguish all fitted quantities" in page
+    assert "hardly distinguish" not in " ".join(sentences(replace(_data(), calibration=spread)))
 
 
 def test_the_millimetres_are_those_of_the_file() -> None:
@@ -106,7 +106,7 @@ def test_the_first_sentence_counts_what_all_pictures_share() -> None:
     assert f"may be off by {millimetres(2 * shared)} (two sigma)" in page
 
 
-def test_numbers_that_go_together_are_told_as_a_reader_knows_them() -> None:
+def test_numbers_that_go_together_are_reported_as_a_reader_knows_them() -> None:
     assert quantity_names(["flange_from_camera.z", "base_from_camera.rx", "v0_px", "focal"]) == [
         "the camera's place along z on the flange",
         "the camera's turn about x in the base",

@@ -1,4 +1,4 @@
-"""The simulated arm moves as it was told, never faster, and stops when it must."""
+"""The simulated arm moves as it was ordered, never faster, and stops when it must."""
 
 import numpy as np
 import pytest
@@ -128,7 +128,7 @@ def test_a_second_move_waits_for_the_first():
         robot.start_move(MoveTarget(joints_rad=tuple(HOME)))
 
 
-def test_a_protective_stop_halts_it_and_is_told():
+def test_a_protective_stop_halts_it_and_is_reported():
     robot, clock = ready()
     robot.faults.protective_stop_at_move = 1
     robot.start_move(MoveTarget(joints_rad=tuple(HOME + 0.5)))

@@ -1,7 +1,7 @@
 """Rendered pictures against the chain's own projection, by estimators of the test's own.
 
 Corners are measured without the product's detector. Along a pixel row that crosses one edge, the
-row's sum of grey values tells where the edge crosses that row, to the last digit, because each
+row's sum of grey values gives where the edge crosses that row, to the last digit, because each
 pixel integrates over its square. A parabola through those crossings on both arms of a corner is
 the printed line; two lines meet in the corner.
 """
@@ -144,7 +144,7 @@ def test_edge_coverage_equals_counting_points():
         assert _half_plane(offset, a, b) == pytest.approx(counted, abs=2e-3)
 
 
-def test_colours_tell_the_ends_apart():
+def test_colours_distinguish_the_ends():
     """The squares beyond corners (0, 0) and (0, cols - 1) are dark, those of the last row light."""
     optics, seen_from = camera(1279, 724, 1000.0), pose([0, 0, 0], [-0.112, -0.075, 0.4])
     image = render(CHESS, CHESS.corners_m, optics, seen_from, width_px=1279, height_px=724)

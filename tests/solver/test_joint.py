@@ -129,7 +129,7 @@ def test_wrong_corners_weigh_nothing_and_harm_nothing() -> None:
     assert fit.noise.corner_px == pytest.approx(NOISE_PX, rel=0.1)
 
 
-def test_print_noise_is_told_from_corner_noise() -> None:
+def test_print_noise_is_distinguished_from_corner_noise() -> None:
     scene = _scene()
     rng = np.random.default_rng(11)
     offset = np.zeros((BOARD.corner_count, 3))

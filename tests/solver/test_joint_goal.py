@@ -78,7 +78,7 @@ def _bent(terms: dict[str, float]) -> Scene:
     return true
 
 
-def test_a_tilted_sensor_is_told_from_decentering() -> None:
+def test_a_tilted_sensor_is_distinguished_from_decentering() -> None:
     tilt = {"tilt_x_rad": 0.06, "tilt_y_rad": -0.08}
     joint = calibrate(_bent(tilt).views).solutions["joint_ml"]
     assert set(joint.values) & set(FURTHER_NAMES) == set(tilt)

@@ -1,4 +1,4 @@
-"""The uncertainty told in pixels and at the work piece is the one that is there."""
+"""The uncertainty reported in pixels and at the work piece is the one that is there."""
 
 from functools import cache
 
@@ -104,7 +104,7 @@ def _errors(seed: int, mount: Mount) -> tuple[FloatArray, FloatArray]:
 
 
 @pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
-def test_the_errors_of_many_runs_are_as_large_as_told(mount: Mount) -> None:
+def test_the_errors_of_many_runs_are_as_large_as_stated(mount: Mount) -> None:
     found = []
     for seed in range(RUNS):
         fit, views = _fitted(seed, mount)
@@ -118,7 +118,7 @@ def test_the_errors_of_many_runs_are_as_large_as_told(mount: Mount) -> None:
         assert np.sqrt((z**2).mean(axis=0)).max() < 2.0
 
 
-def test_the_map_is_in_the_file_and_tells_what_the_functions_tell() -> None:
+def test_the_map_is_in_the_file_and_holds_what_the_functions_give() -> None:
     true = mixed_scene(noise_px=0.1, thin_f_m=THIN_F_M, k1=K1, robot_mm=0.05, robot_deg=0.005)
     written = CalibrationFile.model_validate(as_mapping(calibrate(true.views), "a run"))
     assert written.uncertainty is not None

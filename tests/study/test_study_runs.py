@@ -238,7 +238,9 @@ def test_a_part_that_a_crash_left_is_dropped_and_none_is_overwritten(
         run_study(asked, copy)
 
 
-def test_what_failed_is_told_and_tried_again(tmp_path: Path, scheduler: str, cell: Cell) -> None:
+def test_what_failed_is_reported_and_tried_again(
+    tmp_path: Path, scheduler: str, cell: Cell
+) -> None:
     plan = read_plan(write_plan(tmp_path))
     for name in ("good", "broken"):
         simulate_corners(plan, tmp_path / "runs" / name)

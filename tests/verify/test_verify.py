@@ -63,7 +63,7 @@ def test_a_camera_that_stayed_is_still_good_and_its_misfit_as_large_as_foretold(
 
 
 @pytest.mark.parametrize("mount", MOUNTS)
-def test_a_knock_of_a_millimetre_is_told_with_its_size(mount: Mount) -> None:
+def test_a_knock_of_a_millimetre_is_reported_with_its_size(mount: Mount) -> None:
     found = _found(new_views(4, mount=mount, camera=KNOCK), mount)
     assert found.verdict == "moved"
     assert found.mount is not None
@@ -86,7 +86,7 @@ def test_a_knock_inside_the_tolerance_that_was_given_is_still_good() -> None:
     assert _checked(knocked, tolerance_m=8e-4).content.verdict == "moved"
 
 
-def test_a_lens_refocused_by_two_thousandths_is_told_with_its_size() -> None:
+def test_a_lens_refocused_by_two_thousandths_is_reported_with_its_size() -> None:
     found = _found(new_views(5, alpha_share=2e-3))
     assert found.verdict == "lens_changed"
     for at in found.alpha:
@@ -95,7 +95,7 @@ def test_a_lens_refocused_by_two_thousandths_is_told_with_its_size() -> None:
         assert at.sigma_px < 2.0
 
 
-def test_both_at_once_are_told_apart() -> None:
+def test_both_at_once_are_distinguished() -> None:
     found = _found(new_views(6, camera=KNOCK, alpha_share=2e-3))
     assert found.verdict == "moved_and_lens_changed"
     assert found.mount is not None
@@ -154,7 +154,7 @@ def test_one_wrong_pose_is_left_out_and_named() -> None:
     assert 4 not in found.frames_used
 
 
-def test_parallel_views_alone_cannot_tell() -> None:
+def test_parallel_views_alone_are_inconclusive() -> None:
     found = _found(new_views(11, parallel=6, tilted=0))
     assert found.verdict == "cannot_tell"
     assert found.noticeable is not None
@@ -172,7 +172,7 @@ def test_an_arm_that_scatters_more_than_it_did_is_not_called_good() -> None:
     assert any("scatter" in note for note in found.notes)
 
 
-def test_too_few_frames_cannot_tell_and_say_so() -> None:
+def test_too_few_frames_are_inconclusive_and_reported() -> None:
     found = _found(new_views(13).take(np.arange(3)))
     assert found.verdict == "cannot_tell"
     assert found.p_value is None

@@ -76,7 +76,7 @@ def test_a_knocked_camera_leaves_with_1_and_says_by_how_much(
 
 
 @pytest.mark.slow
-def test_a_plan_s_most_telling_views_are_run_and_checked(
+def test_a_plan_s_most_informative_views_are_run_and_checked(
     bench: Path, capsys: Cli, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(sys, "argv", [])

@@ -65,7 +65,7 @@ def make_effect(name: str, given: Mapping[str, float | str | Sequence[float]]) -
 
 
 def _unnamed(law: str, numbers: Mapping[str, float]) -> Present:
-    """Return the law, field or curve that a file tells."""
+    """Return the law, field or curve that a file states."""
     if law.startswith(FIELD):
         return field_from(law, numbers)
     if law in {surface.law for surface in SURFACES}:

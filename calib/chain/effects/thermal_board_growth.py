@@ -14,7 +14,7 @@ def _act(values: FloatArray, state: ChainState) -> None:
     camera_m, board = state.base_from_camera[:, :3, 3], state.base_from_board.copy()
     middle = board[:, :3, :3] @ state.points_m.mean(axis=0)
     # to the camera a board that has grown is one that stands nearer by the same share; only a lens
-    # that focuses on it would tell them apart, by less than a thousandth of a pixel
+    # that focuses on it would distinguish them, by less than a thousandth of a pixel
     away = board[:, :3, 3] + middle - camera_m
     board[:, :3, 3] = camera_m + away / size - middle
     if state.in_hand:

@@ -80,7 +80,7 @@ def present_field(
 
 
 def field_from(text: str, given: Mapping[str, float]) -> Present:
-    """Return the field that a file tells; raises KeyError for a number that it cannot have."""
+    """Return the field that a file states; raises KeyError for a number that it cannot have."""
     along = text.partition("/")[2]
     count = 1 + max(int(name.split("_")[1]) for name in given if name.startswith("node_"))
     wide = 1 + max(int(name.split("_")[2]) for name in given if name.startswith("node_"))

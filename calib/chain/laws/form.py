@@ -50,7 +50,7 @@ class Number:
     Attributes
     ----------
     name:
-        In files and in what is told.
+        In files and in reports.
     power:
         Its unit is the covariate's to this power.
     fitted:
@@ -71,7 +71,7 @@ class Form:
     key:
         Unique, as it stands in files.
     name:
-        As it is told (the contract's `form`).
+        As reports name it (the contract's `form`).
     covariates:
         How many it takes.
     functions:

@@ -176,7 +176,7 @@ def law_of(present: Present) -> Law:
 
 
 def law_from(text: str, given: Mapping[str, float]) -> Present:
-    """Return the law that a file tells, with its values.
+    """Return the law that a file states, with its values.
 
     Raises
     ------

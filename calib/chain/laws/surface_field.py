@@ -133,7 +133,7 @@ def rectangle(
 ) -> Rectangle:
     """The waves that a field of that length scale, or a longer one, is made of.
 
-    `finest` are the most half periods along x and y that can be told apart.
+    `finest` are the most half periods along x and y that can be distinguished.
     """
     wide = (1.0 + 2.0 * _MARGIN) * np.array(sides)
     most = np.floor(_REACH * wide / (np.pi * length_scale)).astype(int)
@@ -189,7 +189,7 @@ def present_field(surface: Surface, over: Rectangle, found: Estimate) -> Present
 
 
 def field_from(text: str, given: Mapping[str, float]) -> Present:
-    """Return the field that a file tells; raises KeyError for a number that it cannot have."""
+    """Return the field that a file states; raises KeyError for a number that it cannot have."""
     surface = {s.law: s for s in SURFACES}[text]
     waves = {tuple(int(k) for k in n.split("_")[1:3]): None for n in given if n[:5] == "wave_"}
     over = Rectangle((given["side_x"], given["side_y"]), tuple((i, j) for i, j in waves))

@@ -1,4 +1,4 @@
-"""Which poses tell two rivals apart: T-optimal design (Atkinson, Fedorov 1975).
+"""Which poses distinguish two rivals: T-optimal design (Atkinson, Fedorov 1975).
 
 Poses are taken one after the other, each the one that adds most to what is left of the first
 effect's trace when the second has been fitted to it.

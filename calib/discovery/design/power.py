@@ -1,4 +1,4 @@
-"""What a plan would reveal, how small, and what it could not tell apart.
+"""What a plan would reveal, how small, and what it could not distinguish.
 
 Baarda's minimal detectable bias and its companion for naming (Zaminpardaz, Teunissen 2019,
 DIA-datasnooping): an effect of size s adds s^2 N to the test's noncentrality, N being its
@@ -63,7 +63,7 @@ class Rival:
     overlap:
         Share of this effect's trace in the corners that the rival can mimic.
     experiment:
-        What would tell the two apart, in words.
+        What would distinguish the two, as text.
     """
 
     label: str
@@ -92,7 +92,7 @@ class EffectPower:
     limits:
         One for each of its amounts.
     rivals:
-        Those it could not be told from, the most alike first.
+        Those it could not be distinguished from, the most alike first.
     """
 
     effect: Effect
@@ -232,7 +232,7 @@ def _contains(other: Effect, effect: Effect) -> bool:
 
 
 def alike(power: Power) -> list[tuple[EffectPower, Rival]]:
-    """Every pair that the plan could not tell apart once, from the side that is harder."""
+    """Every pair that the plan could not distinguish once, from the side that is harder."""
     by_label = {e.effect.label: e for e in power.effects}
     pairs = []
     for first, second in combinations(by_label, 2):

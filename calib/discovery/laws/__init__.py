@@ -1,1 +1,1 @@
-"""The search for a law of what has no name: scan, contest, cross-validation, telling."""
+"""The search for a law of what has no name: scan, contest, cross-validation, description."""

@@ -57,7 +57,7 @@ class ArmField:
 
 
 class _Scatter:
-    """The frames' own errors as far as the pictures tell them, in units of the noise."""
+    """The frames' own errors as far as the pictures show them, in units of the noise."""
 
     def __init__(self, fit: JointFit, views: Views) -> None:
         self.unit = np.array([fit.noise.flange_m] * 3 + [fit.noise.flange_rad] * 3)

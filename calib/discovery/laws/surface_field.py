@@ -226,7 +226,7 @@ def _left_out_gain(normals: _Normals, prior: FloatArray) -> float:
 
 
 def _finest(surface: Surface, views: Views) -> tuple[int, int] | None:
-    """The most half periods that the corners can tell apart."""
+    """The most half periods that the corners can distinguish."""
     return None if surface is IMAGE else (views.board.cols, views.board.rows)
 
 

@@ -1,9 +1,9 @@
 """Joints worked out from poses: which of the arm's branches it was in each frame.
 
-A pose has up to eight joint solutions, and an arm's faults tell them apart: a joint's zero offset
+A pose has up to eight joint solutions, and an arm's faults distinguish them: a joint's zero offset
 moves the flange elsewhere in each. For every simple fault the branches are chosen that explain
 the flange's errors best, in turn with the fault's size, from several starts. Choosing among
-branches has a price, told as `price`, that a fault found with them must pay.
+branches has a price, reported as `price`, that a fault found with them must pay.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ _CHECK = "Check when pose and picture are read; pair them by trigger, not by cou
 
 
 def mispaired(views: Views, sources: Sources, miss: tuple[float, float]) -> tuple[Mixup, ...]:
-    """Name what `sources` tells.
+    """Name what `sources` shows.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ class Mixup:
     alike:
         Names of physics, or keys of the recording, that would look the same.
     apart:
-        What would tell them apart.
+        What would distinguish them.
     """
 
     name: str

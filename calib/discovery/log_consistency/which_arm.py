@@ -1,4 +1,4 @@
-"""Which arm it is, told by poses and joints of the log alone."""
+"""Which arm it is, found from poses and joints of the log alone."""
 
 from __future__ import annotations
 

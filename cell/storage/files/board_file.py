@@ -88,7 +88,7 @@ class AprilGrid(_Part):
     @model_validator(mode="after")
     def _countable(self) -> Self:
         if self.tags_x * self.tags_y < 2:
-            raise ValueError("has one tag; two and more tell where its corners are")
+            raise ValueError("has one tag; two and more show where its corners are")
         if self.gap_m > self.tag_m:
             raise ValueError("gap_m is wider than a tag")
         return _checked(self, 4 * self.tags_x * self.tags_y)

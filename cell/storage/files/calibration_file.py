@@ -67,7 +67,7 @@ class CandidateLaw(ResultPart):
     aicc: float | None
     bic: float
     scatter: Sigma
-    """Standard deviation of the weighted residuals; 1 where the sigmas tell all."""
+    """Standard deviation of the weighted residuals; 1 where the sigmas explain all."""
     parameters: dict[str, ParameterPart]
 
 
@@ -125,7 +125,7 @@ class FocusPart(ResultPart):
 
 
 class CovariancePart(ResultPart):
-    """Covariance of the numbers fitted together, in the units their names tell.
+    """Covariance of the numbers fitted together, in the units their names state.
 
     Transforms are freed by increments (x, y, z, rx, ry, rz) in their second-named frame. Where
     the focus moves, alpha and beta are the law's own, far away.
@@ -162,7 +162,7 @@ class TransformPart(ResultPart):
 
 
 class RobotPart(ResultPart):
-    """Which robot, and what the fit with its poses said of it; null where there was no such fit."""
+    """Which robot, and what the fit with its poses found; null where there was no such fit."""
 
     model: str | None = None
     serial: str | None = None
@@ -178,7 +178,7 @@ class RobotPart(ResultPart):
 
 
 class CameraPart(ResultPart):
-    """Which camera, as far as the recording tells."""
+    """Which camera, as far as the recording states."""
 
     model: str | None = None
     serial: str | None = None
@@ -222,7 +222,7 @@ class NotSeparable(ResultPart):
     inflation: PositiveFloat
     """How many times worse the combination is known than its members would be, each alone."""
     separate_with: str
-    """Views that would tell them apart."""
+    """Views that would distinguish them."""
     gain: PositiveFloat
     """By what factor four such views lower the combination's uncertainty."""
 
@@ -243,14 +243,14 @@ class UncertaintyPart(ResultPart):
     projection_sigma_px: tuple[tuple[tuple[Sigma, Sigma], ...], ...]
     """(D, G, 2) along u and v: of where a thing appears that the robot has the place of."""
     workpiece_sigma_m: tuple[tuple[tuple[Sigma, Sigma, Sigma], ...], ...]
-    """(D, G, 3) right, down, away: of where the robot is told a part is, from one picture."""
+    """(D, G, 3) right, down, away: of where a part is for the robot, from one picture."""
 
 
 class ChiSquarePart(ResultPart):
     """Square sum of misses in units of what is expected of them."""
 
     per_freedom: Sigma
-    """One where all that is said of the uncertainty is true."""
+    """One where the stated uncertainty is true."""
     freedom: PositiveFloat
     band: tuple[float, float]
     """Where it then lies at least 99 times in a hundred."""
@@ -363,6 +363,6 @@ class CalibrationFile(ResultPart):
     cross_validation: CrossValidationPart | None = None
     """Whether other frames would have given the same; null with a reason in `missing`."""
     not_separable: tuple[NotSeparable, ...] = ()
-    """What the views of the joint fit cannot tell apart, the worst first."""
+    """What the views of the joint fit cannot distinguish, the worst first."""
     missing: dict[str, str]
     """What could not be known, and why."""

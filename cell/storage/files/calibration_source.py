@@ -129,7 +129,7 @@ class TransformSource(_Part):
 
 
 class RobotSource(_Part):
-    """What the joint fit said of robot and noise."""
+    """What the joint fit found of robot and noise."""
 
     mount: Literal["eye_in_hand", "eye_to_hand"]
     source: Literal["joint", "hand_eye"]
@@ -139,7 +139,7 @@ class RobotSource(_Part):
 
 
 def _fitted_or_none(robot: Any) -> Any:
-    """None for a robot that no fit said anything of."""
+    """None for a robot that no fit describes."""
     return robot if isinstance(robot, dict) and robot.get("source") else None
 
 
@@ -177,7 +177,7 @@ class CalibrationSource(PlacementSource):
 
     @property
     def range_m(self) -> tuple[float, float] | None:
-        """Nearest and farthest distance calibrated, or None where nothing tells."""
+        """Nearest and farthest distance calibrated, or None where nothing states."""
         if self.distance_range_m is not None:
             return self.distance_range_m
         seen = [factor.distance_m for factor in self.scale_factors]
@@ -216,5 +216,5 @@ def read_calibration(path: Path) -> CalibrationSource:
     try:
         return CalibrationSource.model_validate(read_json(path))
     except ValidationError:
-        # JSON is YAML, and the YAML reader tells line and column.
+        # JSON is YAML, and the YAML reader knows line and column.
         return read_model(path, CalibrationSource, schema=SCHEMA)

@@ -64,7 +64,7 @@ class SimulatedRobot(Part):
     flange: str = "tool0"
     """Link of `urdf` that is the tool flange."""
     payload_kg: float = Field(default=0.0, ge=0)
-    """Mass of camera and bracket at the flange. Where it is given, an arm whose controller tells
+    """Mass of camera and bracket at the flange. Where it is given, an arm whose controller reports
     another one is not moved."""
     tcp: Pose | None = None
     """flange_from_tcp as it is set at the controller: an arm with another one is not moved. With
@@ -258,7 +258,7 @@ class CellFile(Part):
 
     @model_serializer(mode="wrap")
     def _with_stated_keep_out(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # that nothing is to be kept out of is something else than not having said so
+        # that nothing is to be kept out of is something else than not having stated it
         data: dict[str, Any] = serialize(self)
         return data | ({"keep_out": []} if self.states_keep_out and not self.keep_out else {})
 

@@ -84,16 +84,16 @@ class EffectPart(ResultPart):
     parameters: dict[str, ValuePart]
     p_value: Probability
     holdout_gain_px: float | None
-    """How much worse the held-out frames are predicted without it; null for a slip."""
+    """How much worse the held-out frames are predicted without it; null for a mix-up in the log."""
 
 
 class AmbiguityPart(ResultPart):
-    """Names that these data cannot tell apart."""
+    """Names that these data cannot distinguish."""
 
     names: list[str]
     why: str
     experiment: str
-    """What would tell them apart, in words."""
+    """What would distinguish them, as text."""
     separate_with: str | None
     """A plan file that would, beside this file; null where no poses can."""
 

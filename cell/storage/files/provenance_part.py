@@ -6,7 +6,7 @@ from cell.storage.files.result_part import ResultPart
 
 
 class DevicePart(ResultPart):
-    """Which camera or robot, as far as the recording tells."""
+    """Which camera or robot, as far as the recording states."""
 
     model: str | None = None
     serial: str | None = None

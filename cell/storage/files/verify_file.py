@@ -113,7 +113,7 @@ class NoticeablePart(ResultPart):
     alpha_share: NotNegative
     workpiece_m: NotNegative
     tolerance_m: PositiveFloat
-    """Above it the check cannot tell."""
+    """Above it the check is inconclusive."""
 
 
 class LengthPart(ResultPart):
@@ -156,7 +156,7 @@ class VerifyFile(ProvenancePart):
     """Name of the recording it was held against."""
     verdict: Verdict
     """`within_tolerance`: it changed, by less than the tolerance that was given, and is still good.
-    `changed`: it is not the camera that was calibrated, but these views do not tell what
+    `changed`: it is not the camera that was calibrated, but these views do not show what
     changed."""
     sentence: str
     """The verdict in words."""

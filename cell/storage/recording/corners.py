@@ -40,7 +40,7 @@ class Corners:
     px:
         frame -> (M, 2) pixels, row by row; NaN where a corner was not found.
     sigma_px:
-        frame -> (M,) the detector's one-sigma per axis, where it told.
+        frame -> (M,) the detector's one-sigma per axis, where it gave one.
     blur_px:
         frame -> edge blur (Gaussian sigma), where it was measured.
     rejected:

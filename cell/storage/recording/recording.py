@@ -103,7 +103,7 @@ class Recording:
 
     @cached_property
     def size_px(self) -> tuple[int, int]:
-        """(width, height) of the images; raises `InputError` where nothing tells."""
+        """(width, height) of the images; raises `InputError` where nothing states."""
         camera = self.header.camera
         if camera.width and camera.height:
             return camera.width, camera.height
@@ -113,7 +113,7 @@ class Recording:
                 return width, height
         raise InputError(
             f"{self.path / 'recording.yaml'}: camera.width and camera.height are unknown and no"
-            " picture tells; write them there"
+            " picture shows; write them there"
         )
 
     def views(self, corners: Corners | None = None) -> Views:

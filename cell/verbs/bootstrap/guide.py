@@ -1,4 +1,4 @@
-"""Decides each move of a bootstrap from what the frames before it have told."""
+"""Decides each move of a bootstrap from what the frames before it have shown."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class BootstrapGuide(Guide):
     Attributes
     ----------
     layout:
-        What was told.
+        What was stated.
     knowledge:
         The fit of every frame so far, None before the first.
     refusal:

@@ -9,7 +9,7 @@ import numpy as np
 from calib.calibration.roughly_known import GuessSigma
 
 _BOUND_SIGMA = 2.0
-"""A bound that somebody tells is taken for two sigmas along each axis."""
+"""A bound that somebody states is taken for two sigmas along each axis."""
 
 
 @dataclass(frozen=True)

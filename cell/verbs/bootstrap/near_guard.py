@@ -46,7 +46,7 @@ class NearGuard(Guard):
     def around(
         cls, cell: CellFile, start_rad: FloatArray, uncertainty: LayoutUncertainty
     ) -> NearGuard:
-        """The guard of a cell whose layout is off by no more than is told; raises `InputError`."""
+        """The guard of a cell whose layout is off by no more than stated; raises `InputError`."""
         joint_speed = float(np.radians(JOINT_SPEED_DEG_S))
         return cls(
             cell, SPEED_M_S, joint_speed, start_rad, carried_uncertainty_m(cell, uncertainty)

@@ -1,4 +1,4 @@
-"""Where no layout is known: three small shifts tell which way the mounted thing is turned."""
+"""Where no layout is known: three small shifts show which way the mounted thing is turned."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LARGEST_M, _SMALLEST_M = 0.02, 0.006
 _EDGE = 0.02
 _DOUBT_OF_ALPHA = 1.3
 _DISTANCES = (0.75, 1.4)
-"""Of the distance seen: what a plan is made for, where nobody told."""
+"""Of the distance seen: what a plan is made for, where nobody states it."""
 _AGREES = 0.25
 
 
@@ -143,7 +143,7 @@ class ProbingGuide(Guide):
         return room_px * distance_m / (_DOUBT_OF_ALPHA * alpha_px)
 
     def _poses(self, views: Views) -> FloatArray:
-        """(N, 4, 4) camera_from_board of each frame, by the lens as it is told."""
+        """(N, 4, 4) camera_from_board of each frame, by the lens as it is stated."""
         alpha_px = PlannedCamera.of(self._cell).alpha_px
         frames = (views.take(np.array([k])) for k in range(len(views)))
         return np.array([board_in_view(frame, alpha_px) for frame in frames])
@@ -154,7 +154,7 @@ class ProbingGuide(Guide):
         return np.asarray(poses[:, :3, :3] @ centre + poses[:, :3, 3])
 
     def _layout(self, views: Views) -> Layout:
-        """What the shifts tell: the rotation on the flange, and no more of the place than that."""
+        """What the shifts say: the rotation on the flange, and no more of the place than that."""
         first, centres = self._poses(views)[0], self._centres_m(views)
         moves, shifts = centres[1:] - centres[0], np.array(self._shifts)
         in_hand = views.mount == "eye_in_hand"

@@ -17,7 +17,7 @@ class ProbingView:
     Attributes
     ----------
     name:
-        In words for the operator.
+        As text for the operator.
     turn_deg:
         Of the board about its own centre: rotation vector along the camera's axes.
     shift:

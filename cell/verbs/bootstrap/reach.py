@@ -18,7 +18,7 @@ class Reach:
     Attributes
     ----------
     known, guard:
-        What the frames have told, and what the arm may do.
+        What the frames have shown, and what the arm may do.
     here_rad:
         (6,) where it stands.
     """

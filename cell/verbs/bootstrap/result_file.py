@@ -117,7 +117,7 @@ class Found:
         }
 
     def lines(self) -> list[str]:
-        """In words, one fact a line."""
+        """As text, one fact a line."""
         places = (
             ("layout.mounted", self.flange_from_mounted, self.mounted_sigma_m,
              self.mounted_sigma_rad),

@@ -88,7 +88,7 @@ class Bootstrap:
         Raises
         ------
         InputError
-            The cell's devices are simulated and this is no dry run, or nobody tells where the
+            The cell's devices are simulated and this is no dry run, or nobody states where the
             simulated arm stands.
         """
         if not dry_run:
@@ -110,7 +110,7 @@ class Bootstrap:
     def run(
         self, devices: Devices, *, simulated: bool, watchers: Iterable[Watcher] = ()
     ) -> Bootstrapped:
-        """Move, and find what the frames tell.
+        """Move, and find what the frames show.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Plans that would tell apart what a diagnosis could not: few poses, each worth several."""
+"""Plans that would distinguish what a diagnosis could not: few poses, each worth several."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _ROOM_M = 0.03
 
 _MOST_ROUNDS = 4
 _COMMENT = """\
-Tells {0} from {1}: {worth}.
+Distinguishes {0} from {1}: {worth}.
 Add these views to the recorded ones and diagnose them together; taken {rounds} times they decide.
 The cell is the diagnosis' twin, with simulated arm and camera: put the `robot` and `camera` of
 your own cell file in their place to take the views for real. The workspace is where the recorded

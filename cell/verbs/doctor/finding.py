@@ -18,7 +18,7 @@ class Finding:
     needed:
         Whether this cell cannot run without it.
     found:
-        What was found, in words.
+        What was found, as text.
     mend:
         What to do where it is not ready.
     """

@@ -37,7 +37,7 @@ _ARAVIS_MEND = (
 
 
 def installed(cell: CellFile | None) -> list[Finding]:
-    """Packages and limits; those that only other cells need are told and do not block."""
+    """Packages and limits; those that only other cells need are named and do not block."""
     python = Finding("Python", True, platform.python_version())
     needed = [_package(name, "pip install calibration-cell") for name in _ALWAYS]
     studies = [_package(name, STUDY_MEND, needed=False) for name in STUDY_PACKAGES]

@@ -116,7 +116,7 @@ def _settings(robot: UniversalRobot, packet: Packet) -> list[Finding]:
 
 
 def _limits(robot: UniversalRobot, limits: JointLimits | None) -> list[Finding]:
-    """Joint limits of the safety settings, where the controller tells them."""
+    """Joint limits of the safety settings, where the controller reports them."""
     try:
         named = arm(robot.model or "")
         reported = read_kinematics(robot.address)

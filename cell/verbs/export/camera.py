@@ -1,4 +1,4 @@
-"""One camera, the same at every distance or told at one: what other programs' formats can say."""
+"""One camera, the same at every distance or taken at one: what other programs' formats can say."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Camera:
     Attributes
     ----------
     image_size_px:
-        (width, height) of the image, or None where nothing tells.
+        (width, height) of the image, or None where nothing states.
     alpha_px, beta_px, u0_px, v0_px:
         Focal lengths and principal point, (0, 0) at the centre of the top-left pixel.
     distortion:
@@ -47,7 +47,7 @@ class Camera:
         )
 
     def size_px(self, tool: str) -> tuple[int, int]:
-        """(width, height); raises `InputError` where nothing tells, naming the tool in need."""
+        """(width, height); raises `InputError` where nothing states, naming the tool in need."""
         if self.image_size_px is None:
             raise InputError(
                 f"the calibration does not state the image's size, which {tool} needs: say"

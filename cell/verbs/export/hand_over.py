@@ -103,7 +103,7 @@ def export_calibration(
     ------
     InputError
         The format cannot say this camera, or the calibration does not determine it; the
-        message tells what to choose.
+        message says what to choose.
     """
     if views is not None and tool != "colmap":
         raise InputError(f"--views: {tool} holds a camera and no pictures; colmap does")

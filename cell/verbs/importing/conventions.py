@@ -1,4 +1,4 @@
-"""What a pose's numbers mean: said by the user, or concluded from names, numbers and pictures."""
+"""What a pose's numbers mean: stated by the user, or concluded from names, numbers and pictures."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _LEAST = 0.005
 
 @dataclass(frozen=True)
 class StatedConvention:
-    """What the user said of the poses; None where nothing."""
+    """What the user stated of the poses; None where nothing."""
 
     rotation: RotationName | None = None
     unit: Unit | None = None
@@ -71,9 +71,9 @@ class Convention:
     inverted:
         Whether they are flange_from_base.
     guessed:
-        What was not said but concluded, each as a sentence to be told aloud.
+        What was not stated but concluded, each as a sentence for the user.
     contradicted:
-        What was said and the pictures speak against, each as a sentence.
+        What was stated and the pictures speak against, each as a sentence.
     """
 
     rotation: RotationName
@@ -83,7 +83,7 @@ class Convention:
     contradicted: tuple[str, ...] = ()
 
     def transform(self, pose: RawPose) -> RigidTransform:
-        """base_from_flange; raises `InputError` where the numbers cannot be what they are said."""
+        """base_from_flange; raises `InputError` where the numbers cannot be what is stated."""
         try:
             turn, p = read_pose(pose.values, self.rotation)
         except ValueError as fault:
@@ -113,7 +113,7 @@ class _Reading:
 
     @property
     def off(self) -> str:
-        """How far off, in words."""
+        """How far off, as text."""
         assert self.closure is not None
         angle, share = np.degrees(self.closure.angle_rad), 1e2 * self.closure.place_share
         return f"{angle:.2f} degrees, places to {share:.1f} % of the way"
@@ -125,7 +125,7 @@ def conclude(
     check: PictureCheck | None = None,
     square_m: float | None = None,
 ) -> tuple[Candidate, Convention]:
-    """The poses, their pictures and their convention: as said, else what there is decides.
+    """The poses, their pictures and their convention: as stated, else what there is decides.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def _by_stated(readings: Sequence[_Reading]) -> _Reading:
     if len(ways) > 1 and not first.candidate.pairing.certain:
         raise InputError(
             f"{first.candidate.poses[0].where}: poses may belong to the pictures"
-            f" {', or '.join(ways)}, and the pictures do not tell which: name the picture of each"
+            f" {', or '.join(ways)}, and the pictures do not show which: name the picture of each"
             " pose in the pose file"
         )
     return first
@@ -232,7 +232,7 @@ def _by_stated(readings: Sequence[_Reading]) -> _Reading:
 def _by_pictures(
     measured: Sequence[_Reading], stated: StatedConvention
 ) -> tuple[_Reading, tuple[str, ...], tuple[str, ...]]:
-    """The reading that the pictures bear out, what to tell of it, and what speaks against it."""
+    """The reading that the pictures bear out, what to report of it, and what speaks against it."""
     order = sorted(range(len(measured)), key=lambda k: (measured[k].size, k))
     smallest = max(measured[order[0]].size, _LEAST)
     close = [k for k in order if measured[k].size < _TELLS_APART * smallest]
@@ -247,7 +247,7 @@ def _by_pictures(
         raise InputError(ask(best.candidate.poses, [best.rotation, *(r.rotation for r in rivals)]))
     notes = (f"the pictures bear this out: robot's and camera's turns agree to {best.off}",)
     if any(rival.inverted != best.inverted for rival in rivals):
-        notes = ("the pictures do not tell the direction of the poses",)
+        notes = ("the pictures do not show the direction of the poses",)
     return best, notes, ()
 
 
@@ -278,11 +278,11 @@ def ask(poses: Sequence[RawPose], readings: Sequence[RotationName]) -> str:
     where, left = poses[0].where, " or ".join(dict.fromkeys(f"--rotation {r}" for r in readings))
     if len(poses[0].values) == 7 and is_unit(poses[0].values[3:]):
         return (
-            f"{where}: a quaternion may be written x y z w or w x y z, and nothing tells which."
+            f"{where}: a quaternion may be written x y z w or w x y z, and nothing shows which."
             " Say --rotation quat_xyzw (ROS, scipy) or --rotation quat_wxyz (ABB, Eigen)."
         )
     return (
         f"{where}: three numbers of a rotation may be a rotation vector (UR) or angles about axes"
         " (rpy: fixed x y z, Fanuc, ROS; euler_zyx: KUKA; euler_xyz: Staubli, Mecademic; euler_zyz:"
-        f" Kawasaki, Doosan), and nothing tells which. Say {left}."
+        f" Kawasaki, Doosan), and nothing shows which. Say {left}."
     )

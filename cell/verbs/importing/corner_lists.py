@@ -1,4 +1,4 @@
-"""Corner lists of other finders, their order told from the pictures.
+"""Corner lists of other finders, their order found from the pictures.
 
 Finders number a board's corners from different ends: by rows or by columns, from any of four
 corners. A picture's own detection says which, for it names corners by where the dark squares lie.
@@ -113,7 +113,7 @@ def _of_json(path: Path) -> dict[str, FloatArray]:
 def _of_file_storage(path: Path) -> dict[str, FloatArray]:
     import cv2  # one layout of several needs it
 
-    read_text(path, JSON_BYTES)  # said in words where it cannot be read
+    read_text(path, JSON_BYTES)  # a clear error where it cannot be read
     try:
         storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
         points = storage.getNode("image_points").mat()
@@ -129,7 +129,7 @@ def _of_file_storage(path: Path) -> dict[str, FloatArray]:
     names = [] if listed is None else [listed.at(k).string() for k in range(listed.size())]
     if names and len(names) != len(each):
         raise InputError(f"{path}: lists {len(names)} pictures for {len(each)} sets of corners")
-    # without names they are told by their order, where there are as many as pictures
+    # without names they are identified by their order, where there are as many as pictures
     keys = [Path(name).name for name in names] or [f"#{k}" for k in range(len(each))]
     return dict(zip(keys, each, strict=True))
 

@@ -48,10 +48,10 @@ class Described:
     corners:
         Corner list of another finder; None: the corners are found here.
     rotation, unit, inverted:
-        How poses are written; `inverted`: they are flange_from_base. None where not said: then
+        How poses are written; `inverted`: they are flange_from_base. None where not stated: then
         the pictures are asked.
     mount:
-        Where the camera sits; None where not said: on the flange, and said aloud.
+        Where the camera sits; None where not stated: on the flange, which is reported.
     robot, name:
         For `recording.yaml`.
     time_bound_s:

@@ -40,7 +40,7 @@ from cell.verbs.importing.raw import Series
 from cell.verbs.importing.sources import common_size_px, pictures_in, pose_files_beside
 
 _BOTH_MOUNTS = (
-    "{one} OR {other} (say --mount): the pictures look the same either way and cannot tell"
+    "{one} OR {other} (say --mount): the pictures look the same either way and cannot show it"
 )
 
 
@@ -198,7 +198,7 @@ def _posed(
 
 
 def _mount_or_direction(convention: Convention) -> str:
-    """The pair of readings that no picture tells apart."""
+    """The pair of readings that no picture distinguishes."""
     one, other = "base_from_flange", "flange_from_base"
     if convention.inverted:
         one, other = other, one

@@ -22,7 +22,7 @@ def as_poses(series: Series, robot: str | None) -> list[Series]:
     Raises
     ------
     InputError
-        The arm is not said or not known, or they are not six angles a row.
+        The arm is not stated or not known, or they are not six angles a row.
     """
     where = series.poses[0].where
     if robot is None:
@@ -62,7 +62,7 @@ def in_order(series: Series) -> FloatArray:
 
 
 def radians(angles: FloatArray) -> FloatArray | None:
-    """The angles in radians where their size tells the unit, else None."""
+    """The angles in radians where their size states the unit, else None."""
     readings = _readings(angles)
     return readings[0][1] if len(readings) == 1 else None
 

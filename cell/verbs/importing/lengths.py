@@ -23,7 +23,7 @@ _CLEARLY_OTHER = 1.15
 
 @dataclass(frozen=True)
 class Lengths:
-    """The unit, why, and what of it was said and the pictures speak against."""
+    """The unit, why, and what of it was stated and the pictures speak against."""
 
     unit: Unit
     why: str

@@ -39,9 +39,9 @@ class NamedPose:
     values:
         6, 7, 12 or 16 numbers.
     rotations:
-        What the names allow; empty where they do not tell.
+        What the names allow; empty where they do not say.
     unit:
-        Of the position, where a name tells.
+        Of the position, where a name states.
     """
 
     values: FloatArray

@@ -28,11 +28,11 @@ class Imported:
         The recording, its frames, in how many of them the board was found, and how many have a
         flange pose.
     guessed:
-        What was concluded and not said.
+        What was concluded and not stated.
     rejected:
         Frame number to the reason why it has no corners.
     contradicted:
-        What was said and the pictures speak against.
+        What was stated and the pictures speak against.
     """
 
     folder: Path

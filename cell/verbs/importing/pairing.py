@@ -29,7 +29,7 @@ class Pairing:
     Attributes
     ----------
     how:
-        In words, to be said aloud.
+        As text, to be reported.
     poses:
         Index into the file's poses for each picture, or -1 for a picture without one.
     between:
@@ -59,12 +59,12 @@ def pairings(
     pictures:
         Their file names.
     bound_s:
-        How far apart in time picture and pose may be; `TIME_BOUND_S` where not said.
+        How far apart in time picture and pose may be; `TIME_BOUND_S` where not stated.
 
     Raises
     ------
     InputError
-        Nothing tells which belong together.
+        Nothing says which belong together.
     """
     by_name = _by_name(pictures, poses)
     if by_name is not None:
@@ -108,7 +108,7 @@ def _by_name(pictures: Sequence[str], poses: Sequence[RawPose]) -> Pairing | Non
 
 
 def varying_numbers(names: Sequence[str]) -> list[tuple[int, ...]]:
-    """The numbers in names of one make that tell them apart: one tuple a place, likeliest first.
+    """The numbers in names of one make that distinguish them: one tuple a place, likeliest first.
 
     `frame_000_cam0.png` varies in its first number, `0000_1279x724.png` too.
     """
@@ -235,7 +235,7 @@ def apply(pairing: Pairing, matrices: FloatArray) -> FloatArray:
 
 
 def _nothing(pictures: Sequence[str], poses: Sequence[RawPose]) -> str:
-    message = f"{len(pictures)} pictures and {len(poses)} poses, and nothing tells which belong"
+    message = f"{len(pictures)} pictures and {len(poses)} poses, and nothing shows which belong"
     example = f"(such as {pictures[0]} and {poses[0].name or poses[0].number or poses[0].where})"
     timed = any(pose.time_s is not None or (pose.number or 0) > 1e8 for pose in poses)
     if timed:

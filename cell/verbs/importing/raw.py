@@ -25,13 +25,13 @@ class RawPose:
     where:
         File and line or key, for messages.
     number:
-        Which image it belongs to, where the file tells; its place in the file otherwise is None.
+        Which image it belongs to, where the file states; its place in the file otherwise is None.
     values:
         6, 7, 12 or 16 numbers.
     rotations, unit:
         What names in the file say of them; empty and None where they do not.
     name:
-        The image's name, or the pose's own, where the file tells.
+        The image's name, or the pose's own, where the file states.
     time_s:
         When it was taken, by the file's own clock.
     """
@@ -60,7 +60,7 @@ class Series:
     poses:
         In the file's order.
     notes:
-        What was concluded in reading them, to be said aloud.
+        What was concluded in reading them, to be reported.
     joint_names:
         For joint angles, where the file names them.
     """

@@ -38,7 +38,7 @@ def read_pose(values: FloatArray, rotation: RotationName) -> tuple[Rotation, Flo
     Raises
     ------
     ValueError
-        They cannot be what they are said to be.
+        They cannot be what they are stated to be.
     """
     if rotation in ("matrix", "matrix_by_columns"):
         return _read_matrix(values, by_columns=rotation == "matrix_by_columns")

@@ -16,7 +16,7 @@ _TABLES = (".csv", ".json", ".yaml", ".yml", ".txt", ".npz", ".samples")
 
 
 def pictures_in(folder: Path) -> tuple[list[Path], tuple[str, ...]]:
-    """The pictures in natural order, and what was left out, to be said aloud.
+    """The pictures in natural order, and what was left out, to be reported.
 
     Hidden files are none, and depth or infrared pictures that stand beside colour ones are left
     out.

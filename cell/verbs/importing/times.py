@@ -38,7 +38,7 @@ def _stamp(stamp: Mapping[str, Any], time_s: float | None) -> float | None:
 
 
 def seconds(value: float) -> float:
-    """A time as seconds: counts of this century tell by their size what they count."""
+    """A time as seconds: counts of this century say by their size what they count."""
     size = abs(value)
     for above, scale in ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)):
         if size > above:

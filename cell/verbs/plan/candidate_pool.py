@@ -1,4 +1,4 @@
-"""All views a plan may be made of, what each would tell, and the choice among them."""
+"""All views a plan may be made of, what each would contribute, and the choice among them."""
 
 from __future__ import annotations
 

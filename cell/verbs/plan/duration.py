@@ -1,4 +1,4 @@
-"""How long a run will take, as far as arm, lens and plan tell."""
+"""How long a run will take, as far as arm, lens and plan state."""
 
 from __future__ import annotations
 

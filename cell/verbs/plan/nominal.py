@@ -19,7 +19,7 @@ from cell.verbs.plan.reach import layout_of
 from sim.cell import SimulatedCell
 
 USUAL_NOISE = Noise(corner_px=0.1, flange_m=3e-5, flange_rad=1e-4)
-"""A good detector and an arm of this class; taken where the cell file does not tell."""
+"""A good detector and an arm of this class; taken where the cell file does not state."""
 
 _STANDS = ("fixed", "manual")
 
@@ -45,7 +45,7 @@ class Assumed:
     Attributes
     ----------
     cell:
-        As file and layout tell it, without effects.
+        As file and layout state it, without effects.
     model:
         Its chain.
     lens:

@@ -1,4 +1,4 @@
-"""A plan for a cell: the views that tell most, in an order that keeps the arm's way short."""
+"""A plan for a cell: the most informative views, in an order that keeps the arm's way short."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def design_plan(
 
 
 def _chosen(pool: CandidatePool, size: PlanSize) -> list[Candidate]:
-    """The views that tell most, in order; what no move leads to is replaced."""
+    """The most informative views, in order; what no move leads to is replaced."""
     barred: list[Candidate] = []
     for _ in range(_ROUNDS):
         tour, left_out = shortest_tour(pool.choose(size, barred), pool.home_rad, pool.guard)
@@ -64,7 +64,7 @@ def _chosen(pool: CandidatePool, size: PlanSize) -> list[Candidate]:
 
 
 def _by_hand(cell: CellFile, size: PlanSize) -> list[Candidate]:
-    """Views as a person takes them, none chosen for what it tells."""
+    """Views as a person takes them, none chosen for its information."""
     layout, sight, guard = layout_of(cell), PlannedCamera.of(cell), planning_guard(cell)
     views = varied(sight, layout.distances_m, size.seed, by_hand=True)
     tries = islice(views, _TRIES_PER_VIEW * size.varied)

@@ -47,7 +47,7 @@ def power_of(plan: Plan) -> PlanPower:
     Raises
     ------
     InputError
-        The cell tells neither `simulation` nor `layout`, or a view cannot be reached.
+        The cell states neither `simulation` nor `layout`, or a view cannot be reached.
     """
     cell = nominal(plan.cell)
     plan = Plan(plan.path, plan.file, cell)
@@ -120,7 +120,7 @@ def as_lines(found: PlanPower) -> list[str]:
         lines.append(f"missed at their usual size: {', '.join(missed)}")
     lines += [f"cannot be seen: {name} ({why})" for name, why in power.unseen.items()]
     if pairs:
-        text = f"could not be told apart: {'; '.join(pairs)}"
+        text = f"could not be distinguished: {'; '.join(pairs)}"
         lines += fill(text, _WIDTH, subsequent_indent="  ").splitlines()
     return [*lines, "sizes with their units: `cell plan --power` with the plan's name"]
 
@@ -143,7 +143,7 @@ def as_text(found: PlanPower) -> Group:
     parts += [f"cannot be seen: {name} ({why})" for name, why in power.unseen.items()]
     pairs = alike(power)
     if pairs:
-        parts.append("could not be told apart at their usual size:")
+        parts.append("could not be distinguished at their usual size:")
     for first, rival in pairs:
         share = f"{100 * rival.overlap:.1f} %" if rival.overlap < 0.9995 else "all"
         parts.append(

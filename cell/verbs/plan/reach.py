@@ -17,7 +17,7 @@ _FROM_HOME_RAD = np.radians([110.0, 110.0, 110.0, 110.0, 110.0, 200.0])
 """Joints stay this near to home: an arm that folds over or flips its wrist goes a long way."""
 
 _SPEED_M_S, _JOINT_SPEED_RAD_S = 0.1, float(np.radians(30.0))
-"""Those of a plan file that does not tell its own."""
+"""Those of a plan file that does not say its own."""
 
 _SPARE_M = 0.02
 """Plans keep so much more than the cell's clearance: a layout is known to a centimetre or two."""
@@ -54,7 +54,7 @@ def layout_of(cell: CellFile) -> Layout:
 
 
 def planning_guard(cell: CellFile) -> Guard:
-    """The cell's guard, at the speeds of a plan that tells none, with room to spare."""
+    """The cell's guard, at the speeds of a plan that states none, with room to spare."""
     return Guard(cell, _SPEED_M_S, _JOINT_SPEED_RAD_S, spare_m=_SPARE_M)
 
 

@@ -14,7 +14,7 @@ _USUAL_FRAMES = 40
 
 @dataclass(frozen=True)
 class Requirements:
-    """As it stands on the command line; None where nothing was said.
+    """As it stands on the command line; None where nothing was given.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Requirements:
 
 
 def fewest(pool: CandidatePool, alpha_sigma_px: float, seed: int) -> PlanSize:
-    """The smallest plan that promises alpha so well, by bisection: more views never tell less.
+    """The smallest plan that promises alpha so well, by bisection: more views never inform less.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ def shortest_tour(
     home_rad:
         (6,) where the arm starts.
     guard:
-        Allows moves, and tells how long they take.
+        Allows moves, and knows how long they take.
     """
     joints = np.array([home_rad, *(c.joints_rad for c in candidates)])
     seconds = _seconds(joints, guard)

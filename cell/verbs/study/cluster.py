@@ -17,7 +17,7 @@ from distributed import Client, LocalCluster
 
 from drivers.errors import DeviceUnreachable
 
-# its tracebacks of lost links are no news: what they mean is told in words; its client's log has a
+# its tracebacks of lost links are no news: the messages say what they mean; its client's log has a
 # level of its own
 for _name in ("distributed", "distributed.client"):
     logging.getLogger(_name).setLevel(logging.CRITICAL)

@@ -1,4 +1,4 @@
-"""What a calibration or a diagnosis told, held against the simulator's truth."""
+"""What a calibration or a diagnosis reported, held against the simulator's truth."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Estimate:
     of, quantity:
         Whose it is (a solution's, an effect's), and its name with its unit.
     value, sigma, truth:
-        As told, its one sigma where one was told, and as it is where that means something.
+        As stated, its one sigma where one was reported, and as it is where that means something.
     """
 
     of: str
@@ -60,7 +60,7 @@ class Estimate:
     truth: float | None
 
     def as_mapping(self) -> dict[str, Any]:
-        """With `error`, told less true, and `z`, that in sigmas."""
+        """With `error`, estimate less truth, and `z`, that in sigmas."""
         error = None if self.truth is None else self.value - self.truth
         z = error / self.sigma if error is not None and self.sigma else None
         return {**vars(self), "error": error, "z": z}

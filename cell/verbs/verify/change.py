@@ -1,4 +1,4 @@
-"""New pictures held against an old calibration that may be off only as far as it said itself.
+"""New pictures held against an old calibration that may be off only as far as it stated itself.
 
 The old numbers are the truth plus an error with the covariance that their fit gave; each logged
 flange pose is off by the arm's scatter; a corner by its noise. What changed since is a further

@@ -307,6 +307,6 @@ def _notes(old: OldCell, found: Judgement, length: LengthFound | None) -> tuple[
     if length is None:
         notes.append(
             "no known length was given: camera and robot were held against each other alone;"
-            " --length-m, --length-sigma-m and --corners bring in a third witness"
+            " --length-m, --length-sigma-m and --corners bring in a third, independent measurement"
         )
     return tuple(notes)

@@ -72,7 +72,7 @@ class Judgement:
     verdict:
         By the pictures alone, before power and known length are looked at.
     because:
-        What decided, in words; empty where nothing needs saying.
+        What decided, as text; empty where nothing needs saying.
     board:
         The board's place.
     still, moved, lens, both:

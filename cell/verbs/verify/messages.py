@@ -15,7 +15,7 @@ HEADS = {
     "moved_and_lens_changed": "Moved, and the lens changed",
     "changed": "Changed",
     "length_wrong": "Known length measured wrong",
-    "cannot_tell": "Cannot tell",
+    "cannot_tell": "Inconclusive",
 }
 FRAME_HEAD = ("frame", "distance m", "misfit px", "one sigma px", "limit px", "across mm",
               "work piece mm")  # fmt: skip
@@ -46,7 +46,7 @@ def sentence_of(found: VerifyFile) -> str:
             )
         case "changed":
             return (
-                "The camera is not as it was calibrated, but these views do not tell whether it"
+                "The camera is not as it was calibrated, but these views do not show whether it"
                 " moved or its lens changed: take more views, tilted and at several distances."
             )
         case "length_wrong":
@@ -79,7 +79,7 @@ def _inside(found: VerifyFile) -> str:
 def _noticed(found: VerifyFile) -> str:
     assert found.noticeable is not None
     return (
-        f", as far as these views tell: a change that makes"
+        f", as far as these views show: a change that makes"
         f" {1e3 * found.noticeable.workpiece_m:.2f} mm at the work piece would have been noticed"
         " nine times in ten"
     )

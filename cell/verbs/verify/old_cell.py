@@ -36,7 +36,7 @@ _FAR = {"alpha0_px": "alpha_px", "alpha_inf_px": "alpha_px"} | {
 
 @dataclass(frozen=True)
 class OldCell:
-    """What a calibration said of camera, mount and board, and how well it knew them.
+    """What a calibration stated of camera, mount and board, and how well it knew them.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ def old_cell(calibration: CalibrationSource) -> OldCell:
     if robot is None or found is None or found.covariance is None or size is None or span is None:
         raise InputError(
             "has no joint fit of camera and robot with its covariance, and without it nothing"
-            " tells how far off a picture may be. Run cell calibrate anew, on a recording with"
+            " says how far off a picture may be. Run cell calibrate anew, on a recording with"
             " flange poses"
         )
     mounted, fixed = (_transform(calibration, name) for name in _PLACES[robot.mount])

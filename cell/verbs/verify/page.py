@@ -92,7 +92,7 @@ def _cards(found: VerifyFile) -> str:
 def _length_card(found: VerifyFile) -> str:
     length = found.length
     if length is None:
-        return html.card("Known length", "not given", "no witness but camera and robot")
+        return html.card("Known length", "not given", "no measurement but camera and robot")
     return html.card(
         "Error of length measurement",
         f"{1e3 * length.error_m:+.3f} mm",

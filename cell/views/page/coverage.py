@@ -27,7 +27,7 @@ class Coverage:
     Attributes
     ----------
     plan, sight:
-        The plan, and what its camera sees; None where nothing tells its scale factor.
+        The plan, and what its camera sees; None where nothing states its scale factor.
     planned_poses:
         (V, 4, 4) base_from_flange.
     transforms:

@@ -128,7 +128,7 @@ function showNow(now) {
 }
 
 function showCamera(part) {
-  put("camera", part.values.map((v) => `${v.name} ${v.value}`).join(", ") || "tells nothing");
+  put("camera", part.values.map((v) => `${v.name} ${v.value}`).join(", ") || "reports nothing");
 }
 
 function showFrame(frame) {
@@ -178,9 +178,9 @@ function meter(id, value, limit, words) {
     const x = (298 * limit) / full;
     drawing.append(svg("path", { d: `M${x},0V16`, stroke: "#1c2127", "stroke-width": 2 }));
   }
-  const told = limit == null ? words(value) :
+  const text = limit == null ? words(value) :
     `${words(value)}, allowed ${words(limit)}: ${bad ? "too much ✗" : "good ✓"}`;
-  at(id).replaceChildren(told, drawing);
+  at(id).replaceChildren(text, drawing);
 }
 
 function showEstimate(part) {
@@ -376,9 +376,9 @@ async function ask(path, more) {
         keepalive: true,
         signal: AbortSignal.timeout(PATIENCE_MS),
       });
-      const told = response.headers.get("content-type") === "application/json" ?
+      const answered = response.headers.get("content-type") === "application/json" ?
         (await response.json()).words : (await response.text()).trim();
-      answer(told, !response.ok);
+      answer(answered, !response.ok);
       return;
     } catch {
       answer(`${path === "stop" ? "Stop" : "That"} has not got through yet, trying again.`, true);

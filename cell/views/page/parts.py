@@ -1,4 +1,4 @@
-"""The parts of the page that the run itself tells, as plain JSON values."""
+"""The parts of the page that the run itself states, as plain JSON values."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def camera_part(frame: Frame) -> dict[str, Any]:
 
 
 def frame_part(checked: Checked, number: int, view: str, plan: Plan) -> dict[str, Any]:
-    """A frame's corners and what its check said."""
+    """A frame's corners and what its check found."""
     height, width = checked.shot.frame.image.shape[:2]
     found, checks = checked.verdict.detection, plan.file.checks
     content: dict[str, Any] = {

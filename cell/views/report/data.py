@@ -54,7 +54,7 @@ class Truth:
     alpha_px, beta_px:
         (N,) true scale factors at each view's focus, pixels.
     effects:
-        The effects that were in the simulated physics, in words.
+        The effects that were in the simulated physics, as text.
     """
 
     board_from_camera: FloatArray | None = None
@@ -117,7 +117,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class ReportData:
-    """Everything a report may show; whatever is None or empty is said to be missing.
+    """Everything a report may show; whatever is None or empty is named as missing.
 
     Attributes
     ----------

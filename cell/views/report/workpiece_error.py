@@ -21,7 +21,7 @@ class WorkpieceError:
         (N,) depth of the board's centre, and RMS error of a part of the board's size located in
         that one picture, metres.
     against:
-        In words, what it was measured against.
+        As text, what it was measured against.
     """
 
     distance_m: FloatArray

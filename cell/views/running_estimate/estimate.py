@@ -38,7 +38,7 @@ class Estimate:
     frames, used:
         How many were looked at, and how many took part.
     missing:
-        Why there is no fit yet, in words; empty where there is one.
+        Why there is no fit yet, as text; empty where there is one.
     distance_m, alpha_px, sigma_px:
         (D,) the planned distances' range, the scale factor there, one sigma of it; empty without
         a fit.

@@ -76,7 +76,7 @@ class RunningEstimate(Watcher):
         ]
 
     def on_estimate(self, heard: Callable[[Estimate], None]) -> None:
-        """Tell `heard` of every estimate too, from a thread of its own."""
+        """Hand `heard` every estimate too, from a thread of its own."""
         self._heard.append(heard)
 
     def checked(self, checked: Checked) -> None:
@@ -114,7 +114,7 @@ class RunningEstimate(Watcher):
             while (found := self._frames.get()) is not None:
                 self._link.send(found)
         except OSError:
-            return  # the process is gone, which the other thread tells
+            return  # the process is gone, which the other thread reports
 
     def _receive(self) -> None:
         try:

@@ -79,7 +79,7 @@ class Sights:
 
 
 def lacking(planned: Sights, seen: Sights) -> tuple[str, ...]:
-    """What a plan has and the frames so far do not, in words; empty where nothing is lacking.
+    """What a plan has and the frames so far do not, as text; empty where nothing is lacking.
 
     Every third of the planned distances must be seen twice, and boards tilted along either axis of
     the image twice, or as often as the plan has them where that is less.

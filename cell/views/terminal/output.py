@@ -12,7 +12,7 @@ from typing import Any
 from cell.errors import InputError
 
 _kept = logging.getLogger("cell.output")
-"""What the operator was told; it goes to the log file alone, stderr has it already."""
+"""Messages to the operator; they go to the log file alone, stderr has it already."""
 
 _kept.propagate = False
 _kept.addHandler(logging.NullHandler())
@@ -24,13 +24,13 @@ def show(text: str, result: Mapping[str, Any], *, as_json: bool) -> None:
 
 
 def say(text: str) -> None:
-    """Tell the operator something that is not the result."""
+    """Show the operator something that is not the result."""
     sys.stderr.write(text + "\n")
     _kept.info(text)
 
 
 def keep_log(path: Path) -> None:
-    """Append to a file all that is said from now on, with its time.
+    """Append to a file every message from now on, with its time.
 
     Raises
     ------
@@ -48,5 +48,5 @@ def keep_log(path: Path) -> None:
 
 
 def say_error(text: str) -> None:
-    """Tell an error; several, one a line, stand below each other with their file and line first."""
+    """Show an error; several, one a line, stand below each other, file and line first."""
     say(f"error:\n{text}" if "\n" in text else f"error: {text}")

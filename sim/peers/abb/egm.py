@@ -24,7 +24,7 @@ _HOST = "127.0.0.1"
 
 
 class Controller(Protocol):
-    """What the stream tells of its controller."""
+    """What the stream reports of its controller."""
 
     running: bool
     world_from_base: RigidTransform

@@ -22,7 +22,7 @@ _UNUSED_AXIS = "9E+09"
 
 
 class Controller(panel_services.Controller, Protocol):
-    """What the resources tell of their controller, and what they order."""
+    """What the resources report of their controller, and what they order."""
 
     running: bool
     faults: ABBFaults

@@ -21,7 +21,7 @@ _GOODBYE = "Disconnected"
 
 
 class Controller(Protocol):
-    """What this server tells of its controller, and what it orders."""
+    """What this server reports of its controller, and what it orders."""
 
     version: tuple[int, int, int, int]
     remote_control: bool

@@ -34,14 +34,14 @@ class ScriptRegisters:
         return tuple(float(self._registers.get(name, 0.0)) for name in names)
 
     def out(self, index: int) -> int:
-        """An integer that the script told."""
+        """An integer that the script wrote."""
         return int(self._registers[f"output_int_register_{index + self._offset}"])
 
     def set_out(self, index: int, value: int) -> None:
-        """Tell an integer."""
+        """Write an integer."""
         self._registers[f"output_int_register_{index + self._offset}"] = value
 
     def set_out_doubles(self, values: Iterable[float]) -> None:
-        """Tell numbers, from the first register on."""
+        """Write numbers, from the first register on."""
         for index, value in enumerate(values, self._offset):
             self._registers[f"output_double_register_{index}"] = value

@@ -38,7 +38,7 @@ Reply = tuple[int, dict[str, Any]]
 
 
 class Controller(Protocol):
-    """What this server tells of its controller, and what it orders."""
+    """What this server reports of its controller, and what it orders."""
 
     version: tuple[int, int, int, int]
     remote_control: bool

@@ -37,7 +37,7 @@ class _Client:
 
 
 class Controller(Protocol):
-    """What this server tells of its controller, and where it writes."""
+    """What this server reports of its controller, and where it writes."""
 
     version: tuple[int, int, int, int]
     faults: URFaults

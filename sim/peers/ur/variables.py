@@ -1,8 +1,8 @@
-"""What RTDE tells of the arm beyond joints and pose: a table of types, and where values come from.
+"""What RTDE reports of the arm beyond joints and pose: table of types, and where values come from.
 
 Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", robot controller outputs. Names
 that clients ask for by default are all here. What this arm has no physics for (temperatures,
-voltages, tool inputs) is told as of an arm at room temperature with nothing connected to it.
+voltages, tool inputs) is that of an arm at room temperature with nothing connected to it.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def _loads(
 
 
 def nothing(kind: str) -> Value:
-    """What is told of that which this arm has not."""
+    """Values for what this arm has not."""
     if kind == "VECTOR3D":
         return (0.0,) * 3
     return (0.0,) * 6 if kind == "VECTOR6D" else 0

@@ -189,7 +189,7 @@ def until(condition: Callable[[], bool], timeout_s: float = 20.0) -> bool:
 
 
 def wait_steady(arm: Arm, timeout_s: float = 40.0) -> ArmState:
-    """The first reading from after this call that tells of no motion."""
+    """The first reading from after this call that reports no motion."""
     since_s, seen = time.monotonic(), []
 
     def steady() -> bool:

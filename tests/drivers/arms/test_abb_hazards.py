@@ -136,7 +136,7 @@ def test_the_arm_stops_when_our_process_is_killed_on_the_way():
     best_of_three(measure, GOAL_S)
 
 
-def test_a_controller_that_falls_silent_holds_nobody_up_and_is_told():
+def test_a_controller_that_falls_silent_holds_nobody_up_and_is_reported():
     with moving() as (arm, controller, _):
         controller.cut()
         begin_s = time.monotonic()
@@ -216,7 +216,7 @@ def test_the_arm_stops_when_our_process_hangs_on_the_way():
     best_of_three(measure, LINK_WATCH_S + GOAL_S)
 
 
-def test_a_motion_that_the_controller_stopped_for_silence_is_told_as_such():
+def test_a_motion_that_the_controller_stopped_for_silence_is_reported_as_such():
     with moving() as (arm, controller, _):
         controller.cut()
         assert until(lambda: controller.watch.values["stops"] == 1)
@@ -254,7 +254,7 @@ def test_a_refused_stop_switches_the_motors_off():
         assert controller.panel.controller == "motoroff"
 
 
-def test_a_wrong_password_is_told_as_such():
+def test_a_wrong_password_is_reported_as_such():
     with (
         abb_peer() as (controller, _),
         pytest.raises(DeviceRefused, match="password"),
@@ -271,7 +271,7 @@ def test_a_wrong_password_is_told_as_such():
     ],
     ids=["manual", "guard", "emergency"],
 )
-def test_what_keeps_the_arm_from_moving_is_told_before_and_on_the_way(order, words):
+def test_what_keeps_the_arm_from_moving_is_reported_before_and_on_the_way(order, words):
     with moving(**PATIENT_ABB) as (arm, controller, sim):
         order(controller)
         assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT)
@@ -297,7 +297,7 @@ def test_a_move_that_rapid_cannot_make_is_a_fault_with_its_words():
         assert not truly_moving(sim)
 
 
-def test_nobody_there_is_told_as_such():
+def test_nobody_there_is_reported_as_such():
     with pytest.raises(DeviceUnreachable, match="OmniCore"):
         ABBArm("http://127.255.255.254:8610", LOGGED_IN).connect()
 
@@ -322,7 +322,7 @@ def test_a_pose_is_of_the_flange_in_the_base_wherever_the_arm_is_mounted():
         assert np.linalg.norm(off.translation) < 1e-6
 
 
-def test_egm_tells_joints_and_flange_pose_of_one_instant_on_the_way():
+def test_egm_reports_joints_and_flange_pose_of_one_instant_on_the_way():
     forward = kinematics_of("irb140").forward
     with moving(egm=True, **PATIENT_ABB) as (arm, _, _):
         clocks = set()
@@ -338,7 +338,7 @@ def test_egm_tells_joints_and_flange_pose_of_one_instant_on_the_way():
         assert len(clocks) > 15
 
 
-def test_an_egm_port_in_use_is_told_as_such():
+def test_an_egm_port_in_use_is_reported_as_such():
     with connected(egm=True) as (arm, controller, _):
         settings = ABBSettings(login=FACTORY_LOGIN, egm_port=arm._settings.egm_port)
         with pytest.raises(DeviceRefused, match="UDP port"):

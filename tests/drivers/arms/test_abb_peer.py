@@ -18,7 +18,7 @@ def client():
         rws.close()
 
 
-def test_the_speed_ratio_is_told_and_set_and_slows_the_arm():
+def test_the_speed_ratio_is_reported_and_set_and_slows_the_arm():
     with client() as (rws, controller):
         assert rws.get_speedratio() == 100.0
         rws.set_speedratio(25.0)
@@ -32,7 +32,7 @@ def test_the_speed_ratio_is_told_and_set_and_slows_the_arm():
         arm.close()
 
 
-def test_signals_are_told_and_set_by_network_unit_and_name():
+def test_signals_are_reported_and_set_by_network_unit_and_name():
     with client() as (rws, controller):
         controller.signals |= {"Local/DRV_1/do_lamp": 0.0, "Local/DRV_1/ao_light": 0.0}
         rws.set_digital_io("do_lamp", True)

@@ -64,7 +64,7 @@ def same_pose(a, b, within_m=1e-4, within_rad=1e-4):
     return np.linalg.norm(off.translation) < within_m and off.rotation.magnitude() < within_rad
 
 
-def test_an_arm_at_rest_tells_its_flange_pose_and_joints(connected):
+def test_an_arm_at_rest_reports_its_flange_pose_and_joints(connected):
     state = wait_steady(connected.arm)
     assert state.motion is Motion.STEADY
     assert state.fault is None
@@ -180,7 +180,7 @@ def test_a_senseless_target_is_refused_and_nothing_moves(connected, target):
     assert connected.true_joints() == pytest.approx(connected.home, abs=1e-6)
 
 
-def test_a_fault_stops_the_arm_is_told_in_words_and_stays(connected):
+def test_a_fault_stops_the_arm_is_reported_in_words_and_stays(connected):
     connected.arm.start_move(slowly(connected.nearby(0.5)))
     assert until(lambda: connected.truly_moving())
     connected.trip()
@@ -194,7 +194,7 @@ def test_a_fault_stops_the_arm_is_told_in_words_and_stays(connected):
     assert moved_rad(connected.true_joints(), halted) < 1e-6
 
 
-def test_a_lost_link_is_told_within_two_seconds_and_blocks_nobody(connected):
+def test_a_lost_link_is_reported_within_two_seconds_and_blocks_nobody(connected):
     connected.arm.start_move(slowly(connected.nearby(0.5)))
     connected.lose()
 

@@ -107,7 +107,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("words", "datagram"), BAD)
-def test_what_cannot_be_a_reading_is_dropped_and_told_and_the_next_one_counts(
+def test_what_cannot_be_a_reading_is_dropped_and_reported_and_the_next_one_counts(
     wire, caplog, words, datagram, patient
 ):
     assert not wire.believes(datagram)
@@ -141,7 +141,7 @@ def test_a_new_stream_counts_from_its_own_beginning(wire):
     assert wire.believes(message(number=1, clock_ms=2000))
 
 
-def test_a_flood_is_told_once_for_a_reason_and_the_reader_lives(wire, caplog):
+def test_a_flood_is_reported_once_for_a_reason_and_the_reader_lives(wire, caplog):
     caplog.set_level(logging.WARNING)
     for n in range(300):
         wire.sends(bytes([n % 256]) * (n % 50))

@@ -56,7 +56,7 @@ def session():
         rws.close()
 
 
-def test_robotware_6_and_7_are_told_apart_by_the_login_they_ask_for():
+def test_robotware_6_and_7_are_distinguished_by_the_login_they_ask_for():
     with abb_peer() as (six, _), abb_peer(omnicore=True) as (seven, _):
         assert generation_of(six.url, None) == IRC5
         shown = certificate_of(seven.address, seven.port)
@@ -94,7 +94,7 @@ def test_a_cut_cable_stops_the_motion_under_way():
         controller.faults.mend_cable()
 
 
-def test_a_stop_that_is_refused_by_every_path_is_told():
+def test_a_stop_that_is_refused_by_every_path_is_reported():
     with moving() as (arm, controller, _):
         controller.faults.stops = Stops.REFUSED
 
@@ -109,7 +109,7 @@ def test_a_stop_that_is_refused_by_every_path_is_told():
         assert until(failing)
 
 
-def test_a_guard_stop_is_told_with_what_to_do():
+def test_a_guard_stop_is_reported_with_what_to_do():
     with moving(**PATIENT_ABB) as (arm, controller, sim):
         controller.guard_stop()
         assert until(lambda: arm.state().motion is Motion.STOPPED_BY_FAULT)
@@ -119,7 +119,7 @@ def test_a_guard_stop_is_told_with_what_to_do():
             arm.connect()
 
 
-def test_egm_tells_joints_and_pose_on_the_way():
+def test_egm_reports_joints_and_pose_on_the_way():
     with moving(egm=True, **PATIENT_ABB) as (arm, _, _):
         assert until(lambda: arm.state().raw["source"] == "egm")
 
@@ -147,7 +147,7 @@ def test_an_arm_whose_mastership_somebody_holds_is_refused_in_words():
             arm.connect()
 
 
-def test_a_wrong_password_is_told_as_such_and_not_repeated():
+def test_a_wrong_password_is_reported_as_such_and_not_repeated():
     with abb_peer(omnicore=True) as (controller, _):
         shown = certificate_of(controller.address, controller.port)
         settings = ABBSettings(login=Login("Default User", "guess-4711"), certificate_sha256=shown)

@@ -41,7 +41,7 @@ def moving(**more):
     return ur_moving(polyscope_x=True, **PATIENT, **more)
 
 
-def test_polyscope_5_and_x_are_told_apart_by_what_answers():
+def test_polyscope_5_and_x_are_distinguished_by_what_answers():
     with ur_peer() as (five, _), polyscope_x() as (ten, _):
         assert isinstance(panel_of(five.address, ROBOT_API_PORT), DashboardPanel)
         assert isinstance(panel_of(ten.address, ROBOT_API_PORT), RobotApi)
@@ -53,7 +53,7 @@ def test_polyscope_5_and_x_are_told_apart_by_what_answers():
     ("version", "reported"),
     [("5.0.107", {"robot_api", "polyscope", "model", "serial"}), ("3.1.6", {"robot_api"})],
 )
-def test_what_a_version_does_not_tell_is_left_out(version, reported):
+def test_what_a_version_does_not_report_is_left_out(version, reported):
     with polyscope_x(robot_api_version=version) as (controller, _):
         identity = panel_of(controller.address, ROBOT_API_PORT).identity()
     assert set(identity) == reported

@@ -1,4 +1,4 @@
-"""What the UR driver refuses before it moves, and what it tells of the arm."""
+"""What the UR driver refuses before it moves, and what it sends the arm."""
 
 import socket
 import time
@@ -40,7 +40,7 @@ LOWER_REGISTERS = frozenset(
 )
 
 
-def test_registers_held_by_a_fieldbus_are_told_and_the_upper_ones_serve():
+def test_registers_held_by_a_fieldbus_are_reported_and_the_upper_ones_serve():
     with ur_peer() as (controller, _):
         controller.faults.reserved_inputs = LOWER_REGISTERS
         with pytest.raises(DeviceRefused, match="upper_registers"):
@@ -54,7 +54,7 @@ def test_registers_held_by_a_fieldbus_are_told_and_the_upper_ones_serve():
             arm.close()
 
 
-def test_registers_held_by_another_client_are_told():
+def test_registers_held_by_another_client_are_reported():
     with (
         ur_peer() as (controller, _),
         holding_registers(controller.address),
@@ -96,7 +96,7 @@ def test_a_controller_too_old_for_the_tool_offset_is_refused():
             URArm(controller.address).connect()
 
 
-def test_nobody_there_is_told_as_such():
+def test_nobody_there_is_reported_as_such():
     with pytest.raises(DeviceUnreachable, match="Check power, cable and address"):
         URArm("127.255.255.254").connect()
 

@@ -109,7 +109,7 @@ def test_the_arm_is_stopped_even_if_nobody_asks(fault, goal_s):
     best_of_three(measure, goal_s)
 
 
-def test_after_a_lost_link_old_poses_are_not_told_as_new_ones():
+def test_after_a_lost_link_old_poses_are_not_reported_as_new_ones():
     with ur_moving() as (arm, controller, _):
         mute(controller, arm)
         time.sleep(0.4)
@@ -163,7 +163,7 @@ def test_a_dead_controller_holds_nobody_up():
         assert time.monotonic() - begin_s < 5.0
 
 
-def test_a_controller_that_never_answers_is_told_as_such_and_freezes_nothing():
+def test_a_controller_that_never_answers_is_reported_as_such_and_freezes_nothing():
     with ur_peer() as (controller, _):
         controller.cut()
         arm = URArm(controller.address)
@@ -175,7 +175,7 @@ def test_a_controller_that_never_answers_is_told_as_such_and_freezes_nothing():
 
 @contextmanager
 def frozen_in_constructor():
-    """A UR arm whose child is told to move and waits for ever in ur-rtde's constructor."""
+    """A UR arm whose child is ordered to move and waits for ever in ur-rtde's constructor."""
     # five seconds of watchdog: the arm that is to move stands for so long on a busy machine
     with ur_moving(**PATIENT_UR | {"watchdog_hz": 0.2}) as (arm, controller, sim):
         arm.stop()
@@ -219,7 +219,7 @@ def test_a_stop_takes_no_notice_of_a_constructor_that_never_returns():
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_faults_at_random_instants_leave_the_arm_standing_and_are_told(seed):
+def test_faults_at_random_instants_leave_the_arm_standing_and_are_reported(seed):
     chance = random.Random(seed)
     fault = chance.choice([drop, mute, dead_child, frozen_child, local_mode])
     with ur_moving(**PATIENT_UR) as (arm, controller, sim):
@@ -320,7 +320,7 @@ def test_recovering_from_a_protective_stop_obeys_the_five_second_rule():
         assert wait_steady(arm).joints_rad == pytest.approx(UR_HOME, abs=1e-6)
 
 
-def test_an_emergency_stop_is_told_with_what_to_do():
+def test_an_emergency_stop_is_reported_with_what_to_do():
     with ur_moving(**PATIENT_UR) as (arm, controller, sim):
         controller.emergency_stop()
         assert until(lambda: arm.state().fault is not None)

@@ -147,7 +147,7 @@ def test_the_wheels_receive_client_gets_every_variable_that_it_asks_for_by_defau
     assert sum(v * v for v in reported["getActualToolAccelerometer"]) == pytest.approx(9.80665**2)
 
 
-def test_the_wheels_control_client_is_told_kinematics_and_arrives_where_it_is():
+def test_the_wheels_control_client_is_sent_kinematics_and_arrives_where_it_is():
     with ur_peer() as (controller, _):
         controller.tcp_offset = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         reported = answers_of(_CONTROL, controller.address)

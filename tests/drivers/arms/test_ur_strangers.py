@@ -217,7 +217,7 @@ def test_no_bytes_of_a_packet_raise_anything(body):
     assert wrong is None or wrong.isprintable()
 
 
-def test_nobody_listens_is_told_as_such():
+def test_nobody_listens_is_reported_as_such():
     with socket.create_server((own_address(), 0)) as server:
         address = server.getsockname()[0]
     with pytest.raises(DeviceUnreachable, match="does not answer"):

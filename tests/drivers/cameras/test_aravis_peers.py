@@ -183,7 +183,7 @@ def test_a_frame_that_is_lost_whole_is_not_replaced_by_the_next(
         camera.close()
 
 
-def test_losses_are_told_although_a_stream_counts_only_packets(
+def test_losses_are_reported_although_a_stream_counts_only_packets(
     peer: GigEPeer, scene: Scene
 ) -> None:
     aravis, _ = import_aravis()

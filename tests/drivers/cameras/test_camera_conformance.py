@@ -75,7 +75,7 @@ def test_a_bad_exposure_is_refused_and_changes_nothing(rig: Rig) -> None:
     assert rig.camera.grab(TIMEOUT_S).exposure_s == before
 
 
-def test_focus_goes_where_it_is_told_and_is_in_every_frame(rig: Rig) -> None:
+def test_focus_goes_where_it_is_ordered_and_is_in_every_frame(rig: Rig) -> None:
     if "focus" not in rig.can:
         assert rig.camera.focus(FocusSetting("hold")) is None
         with pytest.raises(DeviceRefused):

@@ -52,7 +52,7 @@ def test_the_producer_is_found_on_the_search_path(monkeypatch: pytest.MonkeyPatc
     camera.close()
 
 
-def test_no_producer_on_the_search_path_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_producer_on_the_search_path_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("GENICAM_GENTL64_PATH", raising=False)
     assert "GENICAM_GENTL64_PATH has none" in refusal(GenTLCamera())
 

@@ -194,7 +194,7 @@ def test_a_killed_camera_is_noticed_and_reopened_with_its_settings(
     killed_s = time.monotonic()
     with pytest.raises(DeviceUnreachable, match="connect again"):
         camera.grab(1.0)
-    assert time.monotonic() - killed_s < 1.3  # the caller never waits longer than it said
+    assert time.monotonic() - killed_s < 1.3  # the caller never waits longer than it stated
     while True:
         with pytest.raises(DeviceUnreachable) as lost:
             camera.grab(1.0)
@@ -243,7 +243,7 @@ def test_a_dead_camera_frees_the_caller_when_closed(peer: GigEPeer) -> None:
     peer.start()
 
 
-def test_no_camera_at_the_address_is_said(scene: Scene) -> None:
+def test_no_camera_at_the_address_is_reported(scene: Scene) -> None:
     camera = AravisCamera(own_address())
     with pytest.raises(DeviceUnreachable, match="check its power, cable and address"):
         camera.connect()

@@ -71,7 +71,7 @@ def host(peer: GigEPeer) -> Iterator[Host]:
     made.socket.close()
 
 
-def test_discovery_tells_model_and_serial_number(host: Host) -> None:
+def test_discovery_reports_model_and_serial_number(host: Host) -> None:
     status, payload = host.ask(0x0002)
     assert (status, len(payload)) == (SUCCESS, 0xF8)
     assert payload[0x68:0x6B] == b"M-1"

@@ -92,7 +92,7 @@ def test_a_server_that_does_not_answer_holds_nobody_up(
     assert camera.grab(5.0).image.shape[:2] == (HEIGHT, WIDTH)
 
 
-def test_nobody_at_the_address_is_said_with_what_to_check() -> None:
+def test_nobody_at_the_address_is_reported_with_what_to_check() -> None:
     camera = RobotiqCamera("127.0.0.1:9")
     with pytest.raises(DeviceUnreachable, match="URCap"):
         camera.connect()

@@ -1,4 +1,4 @@
-"""An arm that does something else than it was told, seen by its readings through the real drivers.
+"""An arm that does not do as ordered, seen by its readings through the real drivers.
 
 `python -m benchmarks.fault_runs.disturbances` has all of them on every cell, at more instants.
 """
@@ -19,7 +19,7 @@ KINDS = {kind.name: kind for kind in DISTURBANCES}
     ("stand", "name"),
     [("ur+gige", "pushed where it stands"), ("abb+robotiq", "another way, 8° beside")],
 )
-def test_an_arm_that_does_something_else_is_stopped_and_that_is_said(
+def test_an_arm_that_does_something_else_is_stopped_and_that_is_reported(
     stand: str, name: str, tmp_path: Path
 ) -> None:
     kind = KINDS[name]

@@ -34,7 +34,7 @@ OWN_TO_NEWER = {
     "connections dropped",
     "Ctrl-C, and the stop is refused",
 }
-"""What the newer controllers say, or are told, in a way that the older ones do not have."""
+"""What the newer controllers report, or are sent, in a way that the older ones do not have."""
 
 CASES = [
     pytest.param(stand, fault, id=f"{stand}: {fault.name}")
@@ -46,7 +46,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("stand", "fault"), CASES)
-def test_a_fault_leaves_the_arm_standing_the_recording_whole_and_the_operator_told(
+def test_a_fault_leaves_the_arm_standing_the_recording_whole_and_the_operator_informed(
     stand: str, fault: Fault, tmp_path: Path
 ) -> None:
     (instant_s,) = instants(stand, fault, 1, SEED)

@@ -47,7 +47,7 @@ def texts(camera: Camera, world: str, seen: Sequence[Seen], points_m: FloatArray
     Parameters
     ----------
     world:
-        What the model's world is, in words.
+        What the model's world is, as text.
     points_m:
         (M, 3) the board's corners in the world, metres.
     """

@@ -51,7 +51,7 @@ def clock_offset(
 
     Returns
     -------
-    None where the pictures do not tell: too few, or the arm hardly turned meanwhile.
+    None where the pictures do not show: too few, or the arm hardly turned meanwhile.
     """
     if len(times_s) <= _FEWEST_PAIRS:
         return None
@@ -78,7 +78,7 @@ def _pairs(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _polished(misfit: Callable[[float], FloatArray], start_s: float) -> ClockOffset | None:
-    """Gauss-Newton with Huber's weights from the best of the grid; None where nothing is told."""
+    """Gauss-Newton with Huber weights from the best of the grid; None where they show nothing."""
     tau = start_s
     for _ in range(_ROUNDS):
         r = misfit(tau)

@@ -60,7 +60,7 @@ def import_bag(
     Raises
     ------
     InputError
-        The bag cannot be read, or does not tell which topics are meant; the message lists them.
+        The bag cannot be read, or does not show which topics are meant; the message lists them.
     BadAnswer
         The board was found in no picture.
     """
@@ -159,7 +159,7 @@ def _offset(
     stated = described.bag.clock_offset_s
     found = _estimated(bag, contents, robot, board, order)
     if found is None:
-        message = "the pictures do not tell by how much the camera's clock is off from the joints'"
+        message = "the pictures do not show by how much the camera's clock is off from the joints'"
     else:
         late = "late" if found.offset_s < 0 else "early"
         message = (

@@ -42,11 +42,11 @@ class Robot:
     Attributes
     ----------
     way, joints, kinematics:
-        Transforms, joint angles and the arm; None where the bag does not tell.
+        Transforms, joint angles and the arm; None where the bag does not report.
     description:
         Where the bag has it and it describes an arm of six joints.
     notes:
-        What was concluded, to be said aloud.
+        What was concluded, to be reported.
     """
 
     way: Way | None
@@ -57,7 +57,7 @@ class Robot:
 
     @property
     def has_poses(self) -> bool:
-        """Whether anything tells where the flange was."""
+        """Whether anything states where the flange was."""
         return self.way is not None or self._by_joints is not None
 
     @property
@@ -85,7 +85,7 @@ class Robot:
 def find_robot(
     contents: Contents, model: str | None, base: str | None, flange: str | None
 ) -> Robot:
-    """What the bag, and the user, tell of the arm; raises `InputError` for a wrong name."""
+    """What the bag, and the user, say of the arm; raises `InputError` for a wrong name."""
     notes: list[str] = []
     way = way_between(contents.transforms, base, flange)
     kinematics, description, names = _arm(contents, model, base, flange, notes)
@@ -141,7 +141,7 @@ def _in_order(names: tuple[str, ...], joints: Joints, notes: list[str]) -> Joint
 
 
 def no_poses(robot: Robot, contents: Contents) -> str:
-    """What to say where nothing tells where the flange was."""
+    """What to say where nothing states where the flange was."""
     frames = ", ".join(contents.transforms.frames[:20]) or "none"
     return (
         "no flange poses: the lens alone can be calibrated. Name the frames of the transforms with"

@@ -35,7 +35,7 @@ PROGRAMS: tuple[Reader, ...] = (
     urscript.read,
     assignments.read,
 )
-"""Told by their own words; the first that finds something has it."""
+"""Recognised by their own keywords; the first that finds something has it."""
 
 _ARCHIVES = (".npz", ".npy")
 

@@ -19,7 +19,7 @@ _SLIPS = {
 
 
 def remedy_of(effect: Mapping[str, Any]) -> str | None:
-    """What to do about an effect of diagnosis.json, or None where nobody has said."""
+    """What to do about an effect of diagnosis.json, or None where there is no remedy."""
     if effect.get("remedy"):
         return str(effect["remedy"])
     name = str(effect["name"])

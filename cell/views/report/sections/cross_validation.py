@@ -96,7 +96,7 @@ def _how(found: Mapping[str, Any]) -> str:
     return (
         f"{len(found['folds'])} folds, each with frames of all distances, the earliest in the "
         "first; the same numbers free, noise levels kept. A fold's fit may differ from the fit of "
-        "all by the root of the difference of their variances: 1 is as stated. More tells that "
+        "all by the root of the difference of their variances: 1 is as stated. More means that "
         "corners of one frame, or frames taken one after the other, err together (a board that is "
         "not flat, a lens that the model does not follow, an arm that warms up) and are counted as "
         "if they did not. Noise levels were estimated from these same frames: frames held out "

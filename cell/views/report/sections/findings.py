@@ -188,7 +188,7 @@ def _rivals(diagnosis: Mapping[str, Any]) -> str:
             "No other known effect explains the recording as well."
         )
     table = html.table(
-        ("could also be", "because", "what would tell them apart"),
+        ("could also be", "because", "what would distinguish them"),
         [
             (", ".join(n.replace("_", " ") for n in row["names"]), row.get("why") or "",
              _separation(row))

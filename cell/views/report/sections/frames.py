@@ -101,7 +101,7 @@ def _note(data: ReportData, at: np.ndarray) -> str:
 
 
 def _corner_paths(corners: FloatArray, cols: int, width_px: int) -> Iterator[str]:
-    """All corners as dots, the first row again as a line that tells its start."""
+    """All corners as dots, the first row again as a line that marks its start."""
     dots = "".join(f"M{u:.0f} {v:.0f}h0" for u, v in corners if np.isfinite(u))
     if dots:
         yield f'<path class="halo" stroke-width="{width_px / 38:.0f}" d="{dots}"/>'

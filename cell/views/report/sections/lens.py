@@ -53,7 +53,7 @@ def _zones(data: ReportData, zones: Mapping[str, Any] | None) -> str:
     beta = measured(zones["beta_px"], zones.get("beta_sigma_px"), "px")
     return (
         f"One scale factor holds (zone 2) from {near} to {far}: α = {alpha}, β = {beta}. Nearer, "
-        "it follows the focus (zone 1); farther, the board is too small in the picture to tell "
+        "it follows the focus (zone 1); farther, the board is too small in the picture to show "
         f"(zone 3). {_sentence(zones.get('why'))}"
     )
 

@@ -38,12 +38,12 @@ def not_logged(data: ReportData) -> Iterator[str]:
     """What the log does not have, and what therefore cannot be known."""
     views = data.views
     if not views.has_pose.any():
-        yield "Flange poses were not logged: nothing can be said about errors in millimetres."
+        yield "Flange poses were not logged: nothing is known about errors in millimetres."
         return
     columns = (
         (
             views.joints_rad,
-            "Joint angles were not logged: faults of single joints are hard to tell apart.",
+            "Joint angles were not logged: faults of single joints are hard to distinguish.",
         ),
         (views.t_s, "Times were not logged: drifts stay hidden."),
         (views.temperature_c, "Temperature was not logged: drift can only be seen against time."),

@@ -22,7 +22,7 @@ def made(data: ReportData) -> str:
         html.table(("what", "value"), rows),
         html.paragraph(
             "Lengths are metres, angles radians, pixels count from the centre of the top-left "
-            "pixel; ± is one sigma unless said otherwise. Paper: Ricolfe-Viala and Esparza, "
+            "pixel; ± is one sigma unless stated otherwise. Paper: Ricolfe-Viala and Esparza, "
             "arXiv 2402.04686.",
             "small",
         ),

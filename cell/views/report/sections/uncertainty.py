@@ -1,4 +1,4 @@
-"""How uncertain the camera itself is where it is used, and what the views cannot tell apart."""
+"""How uncertain the camera itself is where it is used, and what the views cannot distinguish."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def uncertainty(data: ReportData) -> str:
     calibration = data.calibration or {}
     return html.section(
         "uncertainty",
-        "Uncertainty of the camera, and what the views cannot tell apart",
+        "Uncertainty of the camera, and what the views cannot distinguish",
         _uncertainty_map(calibration.get("uncertainty")),
         _not_separable(calibration),
         cross_validation(calibration),
@@ -38,7 +38,7 @@ def uncertainty_sentences(data: ReportData) -> Iterator[str]:
             f"{number(found['distance_m'][-1], 'm')} (one sigma, image's mean)."
         )
     for weak in calibration.get("not_separable") or ():
-        message = f"These views hardly tell apart {listed(quantity_names(weak['quantities']))}"
+        message = f"These views hardly distinguish {listed(quantity_names(weak['quantities']))}"
         more = weak["separate_with"]
         helps = f"; {more}." if more.startswith("none") else f": record {more} as well."
         yield message + helps
@@ -87,7 +87,7 @@ def _uncertainty_map(found: Mapping[str, Any] | None) -> str:
     message = (
         "One sigma, from the full covariance of lens, focus law and the camera's place on the "
         "robot. Pixels: where a thing appears that the robot has the place of. Millimetres: where "
-        "the robot is told a part is that one picture located, without that picture's own corner "
+        "the robot takes a part to be that one picture located, without that picture's own corner "
         "noise and the robot's repeatability. What the model leaves out is not in them."
     )
     return html.table(head, rows) + html.paragraph(message, "small") + _map(found, metres)
@@ -118,8 +118,8 @@ def _not_separable(calibration: Mapping[str, Any]) -> str:
     if not found:
         if not (calibration.get("robot") or {}).get("source"):
             return html.missing("Without a joint fit it is not known what goes together.")
-        return html.paragraph("The views tell all fitted quantities apart.")
-    head = ("hardly told apart", "times worse than each alone", "record as well",
+        return html.paragraph("The views distinguish all fitted quantities.")
+    head = ("hardly distinguished", "times worse than each alone", "record as well",
             "four such views help")  # fmt: skip
     rows = [
         (listed(quantity_names(w["quantities"])), number(w["inflation"], "", 2), w["separate_with"],
