@@ -152,6 +152,12 @@ class Views:
         """(N,) which frames have a logged flange pose."""
         return np.asarray(np.isfinite(self.base_from_flange).all(axis=(1, 2)))
 
+    def logged(self, key: str) -> FloatArray:
+        """(N,) that number of the log, one of the named columns or a further key; else NaN."""
+        if key in _PER_FRAME:
+            return np.asarray(getattr(self, key))
+        return self.extra.get(key, np.full(len(self), np.nan))
+
     def take(self, index: NDArray[np.int64] | BoolArray) -> Views:
         """The views at `index` (integers or a mask), in that order."""
         return replace(

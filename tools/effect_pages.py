@@ -84,6 +84,8 @@ def _row(p: Parameter) -> str:
 def _needs(effect: Effect) -> str:
     columns = ", ".join(f"`{column}`" for column in effect.needs)
     log = f"In the log: {columns}." if columns else "Nothing beyond pictures and flange poses."
+    if effect.varies:
+        log += " Varied in the run: " + " or ".join(f"`{key}`" for key in effect.varies) + "."
     moved = " Frames taken while the arm moves (`capture: {mode: moving}`)."
     return log + (moved if effect.moving_only else "")
 

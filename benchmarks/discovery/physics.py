@@ -107,6 +107,30 @@ def _bloom(s: State, k: float) -> None:
     s.picture.append(grow)
 
 
+def _bloom_with_gain(s: State, k: float) -> None:
+    px = k * 0.08 * s.log["gain_db"]
+
+    def grow(pixels: Array) -> Array:
+        middle = pixels.mean(axis=1, keepdims=True)
+        out = pixels - middle
+        far = np.linalg.norm(out, axis=2).max(axis=1)
+        return np.asarray(middle + out * (1 + px / far)[:, None, None])
+
+    s.picture.append(grow)
+
+
+def _picture_drifts(s: State, k: float) -> None:
+    warm = 1.0 - np.exp(-s.log["t_s"] / 200.0)
+    s.centre = s.centre + k * warm[:, None] * np.array([-1.1, 0.7])
+
+
+def _slack(s: State, k: float) -> None:
+    down = -s.flange()[:, 2, :3]
+    side = np.sign(0.8 * down[:, 0] - 0.6 * down[:, 1])
+    stop = k * np.array([0.0, 1e-4, 0.0, 4e-4, 6e-4, 0.0])
+    s.mounted = s.mounted @ rigid(side[:, None] * stop)
+
+
 def _sag(s: State, k: float) -> None:
     s.centre = s.centre + 3.0 * k * s.gravity()[..., :2]
 
@@ -133,6 +157,9 @@ CATALOGUE = (
     Physics("bloom", _bloom, ("exposure_bias",), (*_LENS, "detector")),
     Physics("lens sags", _sag, ("lens_sag",), _LENS),
     Physics("decentred", _decentred, ("decentering", "sensor_tilt"), _LENS),
+    Physics("bloom with gain", _bloom_with_gain, ("exposure_bias",), (*_LENS, "detector")),
+    Physics("picture drifts", _picture_drifts, ("thermal_image_drift",), _LENS),
+    Physics("bracket has play", _slack, ("mount_play",), _MOUNT),
 )
 
 
@@ -234,7 +261,7 @@ OUTSIDE = (
     Physics("focal length follows exposure", _focal(lambda s: 0.12 * s.log["exposure_s"]),
             ("exposure_bias",), (*_LENS, "detector"), ("exposure", "exposure_s"), ("linear",)),
     Physics("bracket has slack", _tool(3, lambda s: 8e-4 * np.sign(s.gravity()[:, 0])),
-            (), _MOUNT, ("gravity",), ("play", "step", "saturating")),
+            ("mount_play",), _MOUNT, ("gravity",), ("play", "step", "saturating")),
     Physics("joint 3 creeps after a stop",
             _joint(2, lambda s: 1.2e-3 * np.exp(-s.log["dwell_s"] / 4.0)), (), _ARM, ("dwell_s",),
             ("relaxation", "curve", "linear")),

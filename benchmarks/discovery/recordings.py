@@ -10,7 +10,17 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.discovery.faults import FAULTS, Fault
 from benchmarks.discovery.physics import Physics
-from benchmarks.discovery.world import CAMERAS, Array, Cell, State, links, make_cell, plan, rigid
+from benchmarks.discovery.world import (
+    BOARDS,
+    CAMERAS,
+    Array,
+    Cell,
+    State,
+    links,
+    make_cell,
+    plan,
+    rigid,
+)
 
 HELD_OUT = 10
 NOISES = ("white", "grows with defocus", "correlated", "heavy tails")
@@ -64,16 +74,24 @@ def conceal(
     clean = state(cell, joints, log, physics)
     shown = state(cell, joints, log, physics)
     shown.tool = np.concatenate([rng.normal(0, 2e-5, (n, 3)), rng.normal(0, 5e-5, (n, 3))], axis=1)
+    chosen = None if fault is None else next(f for f in FAULTS if f.key == fault)
+    knocked = None
+    if chosen is not None and chosen.knocks is not None:
+        knocked = chosen.spoil(log, rng)
+        knock = np.concatenate([rng.normal(0, size, 3) for size in chosen.knocks])
+        for which in (clean, shown):
+            which.base[knocked:] += knock
     noise = str(rng.choice(NOISES))
     sigma = float(rng.uniform(0.06, 0.2))
     pixels = shown.pixels() + _corner_noise(noise, sigma, shown, rng)
     ahead = np.zeros(n, dtype=bool)
     ahead[rng.choice(n, HELD_OUT, replace=False)] = True
-    chosen = None if fault is None else next(f for f in FAULTS if f.key == fault)
-    first = None
-    if chosen is not None:
-        pixels, first = _spoilt(chosen, cell, log, pixels, ahead, rng)
-    return Concealed(cell, physics, chosen, log, pixels, clean.pixels(), ahead, first, noise, sigma)
+    first, true = None, clean.pixels()
+    if knocked is not None:
+        first = int(np.flatnonzero(~ahead & (log["frame"] >= knocked)).min())
+    elif chosen is not None:
+        pixels, true, first = _spoilt(chosen, cell, log, (pixels, true), ahead, rng)
+    return Concealed(cell, physics, chosen, log, pixels, true, ahead, first, noise, sigma)
 
 
 def state(
@@ -134,28 +152,31 @@ def _spoilt(
     fault: Fault,
     cell: Cell,
     log: dict[str, Array],
-    pixels: Array,
+    shown: tuple[Array, Array],
     ahead: Array,
     rng: np.random.Generator,
-) -> tuple[Array, int | None]:
-    """Spoil the recorded frames; what holds for a whole log holds for the rows to predict, too."""
-    whole = {
-        "frame": log["frame"],
-        "poses": log["poses"].copy(),
-        "joints": log["joints"].copy(),
-        "pixels": pixels.copy(),
+) -> tuple[Array, Array, int | None]:
+    """Spoil what the fault spoils: a whole log, or the recorded frames alone."""
+    rows, cols, _ = BOARDS[cell.board]
+    given = {
         "width": np.array([CAMERAS[cell.camera]["width"]]),
+        "middle": cell.centre,
         "arm": np.array([cell.arm]),
+        "grid": np.array([rows, cols]),
     }
+    columns = {"frame": log["frame"], "poses": log["poses"], "joints": log["joints"]}
+    columns |= {"pixels": shown[0], "true": shown[1]}
     seed = int(rng.integers(2**31))
-    if fault.spoil({k: v.copy() for k, v in whole.items()}, np.random.default_rng(seed)) is None:
-        fault.spoil(whole, np.random.default_rng(seed))
-        log["poses"], log["joints"] = whole["poses"], whole["joints"]
-        return whole["pixels"], None
+    spoilt = {name: column.copy() for name, column in columns.items()} | given
+    first = fault.spoil(spoilt, np.random.default_rng(seed))
     here = np.flatnonzero(~ahead)
-    part = {k: v if k in ("width", "arm") else v[here] for k, v in whole.items()}
+    if first is None or fault.stays:
+        log["poses"], log["joints"] = spoilt["poses"], spoilt["joints"]
+        starts = None if first is None else int(here[here >= first].min())
+        return spoilt["pixels"], spoilt["true"], starts
+    part = {name: column[here] for name, column in columns.items()} | given
     first = fault.spoil(part, np.random.default_rng(seed))
     log["poses"][here], log["joints"][here] = part["poses"], part["joints"]
-    pixels = pixels.copy()
+    pixels = shown[0].copy()
     pixels[here] = part["pixels"]
-    return pixels, None if first is None else int(here[first])
+    return pixels, shown[1], None if first is None else int(here[first])

@@ -14,6 +14,7 @@ measure but false names.
 from __future__ import annotations
 
 import argparse
+import re
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -162,16 +163,17 @@ def _judged(
 ) -> Outcome:
     names = [effect.name for effect in found.effects]
     true = [what.names for what, _ in concealed.physics if not case.hidden]
-    true += [concealed.fault.names] if concealed.fault else []
+    true += [concealed.fault.names] if concealed.fault and concealed.fault.names else []
     background = bool(concealed.cell.dh.any())
     tolerated = {name for every in true for name in every} | set(BACKGROUND if background else ())
     false = [name for name in names if name not in tolerated]
     unexplained = found.unexplained_all
     named = all(set(names) & set(every) for every in true if every)
     nameless = [what for what, _ in concealed.physics if not what.names or case.hidden]
+    rejects = concealed.fault is not None and not concealed.fault.names
     ok = not false and (
-        (named and not nameless and (not unexplained))
-        or (bool(unexplained) and case.kind in _NAMELESS)
+        (named and not nameless and not unexplained and not rejects)
+        or (bool(unexplained) and (case.kind in _NAMELESS or rejects))
     )
     link, covariate, form = _located(case, concealed, found)
     before, after = (_miss(concealed, found, cell.model) for cell in (found.plain, found.twin))
@@ -215,31 +217,18 @@ def _frame_right(concealed: Concealed, found: Diagnosis) -> bool | None:
         for name, value in effect.parameters.items()
         if name in ("at_frame", "from_frame")
     }
-    text = " ".join(effect.physics for effect in found.effects)
+    sentences = [effect.physics for effect in found.effects]
+    sentences += [term.where for term in found.unexplained_all]
+    in_text = {int(number) for number in re.findall(r"\b\d+\b", " ".join(sentences))}
     inside = any(before < frame <= concealed.from_frame for frame in reported)
-    return inside or str(concealed.from_frame) in text
+    return inside or concealed.from_frame in in_text
 
 
 def _miss(concealed: Concealed, found: Diagnosis, model: CellModel) -> float:
     rows = np.isin(found.log.frame, np.flatnonzero(concealed.ahead))
     log = found.log.take(rows)
-    true = concealed.true_pixels[log.frame]
-    if concealed.fault is not None and concealed.from_frame is not None:
-        true = _as_pictured(concealed, true, log.frame)
-    miss = predict(model, log) - true
+    miss = predict(model, log) - concealed.true_pixels[log.frame]
     return float(np.sqrt((miss**2).sum(-1).mean()))
-
-
-def _as_pictured(concealed: Concealed, true: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Where a camera that was changed midway would show the corners to be predicted."""
-    assert concealed.fault is not None
-    late = frames >= concealed.from_frame
-    true = true.copy()
-    if concealed.fault.key == "binning midway":
-        true[late] = (true[late] + 0.5) / 2 - 0.5
-    elif concealed.fault.key == "region midway":
-        true[late] -= CAMERAS[concealed.cell.camera]["width"] * np.array([0.06, 0.04])
-    return true
 
 
 def table(outcomes: list[Outcome]) -> str:

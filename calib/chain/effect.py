@@ -55,6 +55,11 @@ def _one_candidate(views: Views) -> Sequence[Mapping[str, float]]:
     return ({},)
 
 
+def _varies(column: FloatArray) -> bool:
+    known = column[np.isfinite(column)]
+    return bool(len(known) and known.min() < known.max())
+
+
 @dataclass(frozen=True)
 class Effect:
     """A departure from the plain chain.
@@ -75,8 +80,9 @@ class Effect:
         Changes the state, given the parameters' values in their order.
     needs:
         Columns of `Views` that must have been logged.
-    needs_variation:
-        Those of them that must not be the same in every frame.
+    varies:
+        Columns, or further keys, of the log of which at least one must not be the same in every
+        frame.
     looks_ahead:
         Asks where camera and board stand before the arm has moved.
     moving_only:
@@ -110,7 +116,7 @@ class Effect:
     remedy: str
     law: str | None = None
     needs: tuple[str, ...] = ()
-    needs_variation: tuple[str, ...] = ()
+    varies: tuple[str, ...] = ()
     looks_ahead: bool = False
     moving_only: bool = False
     seen_without_robot: bool = False
@@ -151,8 +157,8 @@ class Effect:
             value = getattr(views, column)
             if value is None or (isinstance(value, np.ndarray) and not np.isfinite(value).any()):
                 return f"{column} was not logged"
-            if column in self.needs_variation and np.nanmin(value) == np.nanmax(value):
-                return f"{column} was the same in every frame"
+        if self.varies and not any(_varies(views.logged(key)) for key in self.varies):
+            return f"{' and '.join(self.varies)} did not vary, or were not logged"
         return None
 
 

@@ -14,7 +14,7 @@ from calib.chain import rigid
 from calib.chain.effect import Present
 from calib.discovery.log_consistency.consistency import mounted_from_fixed
 from calib.discovery.log_consistency.conventions import find_conventions
-from calib.discovery.log_consistency.corner_orders import find_corner_orders
+from calib.discovery.log_consistency.corner_orders import find_corner_orders, find_listing
 from calib.discovery.log_consistency.frame_steps import find_frame_step
 from calib.discovery.log_consistency.frozen import find_frozen_poses
 from calib.discovery.log_consistency.joint_readings import find_degrees, find_joint_signs
@@ -26,6 +26,7 @@ from calib.discovery.log_consistency.picture_step import as_before, find_picture
 from calib.discovery.log_consistency.recover import recover_joints, recover_poses
 from calib.discovery.log_consistency.robot_model import find_robot_model
 from calib.discovery.log_consistency.single_units import find_single_units
+from calib.discovery.log_consistency.steps_by_joints import find_step_by_joints
 from calib.discovery.log_consistency.which_arm import recognise_arm
 from calib.discovery.start import FreeViews, free_views
 from calib.errors import CalibrationError
@@ -127,6 +128,7 @@ class _Log:
 
 def _repaired(repair: _Log, *, renumbered: bool) -> LogRepair:
     """Mend the log; once more from the pictures on where their corners were renumbered."""
+    repair.mend(find_listing(repair.views))
     baseline = _calibrated(repair)
     free = free_views(baseline, repair.views.height_px)
     loop = mounted_from_fixed(free.camera_from_board, repair.views.mount)
@@ -144,7 +146,8 @@ def _repaired(repair: _Log, *, renumbered: bool) -> LogRepair:
         return _repaired(repair, renumbered=True)
     joints_logged = repair.fill_in_joints()
     repair.mend(find_joint_signs(repair.views))
-    if not repair.mend(find_frame_step(repair.views, loop)):
+    stepped = joints_logged and repair.mend(find_step_by_joints(repair.views))
+    if not stepped and not repair.mend(find_frame_step(repair.views, loop)):
         repair.mend(find_robot_model(repair.views, loop))
     odd = find_odd_frames(repair.views, repair.log, loop)
     if odd is not None and not renumbered:

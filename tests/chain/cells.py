@@ -42,6 +42,7 @@ def cell(mount: Mount = "eye_in_hand", frames: int = 12, seed: int = 3) -> tuple
         t_s=np.linspace(0.0, 1800.0, frames),
         exposure_s=rng.uniform(0.004, 0.02, frames),
         temperature_c=np.linspace(21.0, 33.0, frames),
+        extra={"gain_db": rng.choice([0.0, 3.0, 6.0], frames)},
         robot_model=ARM,
         payload_kg=1.2,
         moving=True,

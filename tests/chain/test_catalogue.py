@@ -25,6 +25,11 @@ UNITS = {
     "m/rad^2",
     "px/g",
     "px/s",
+    "px/dB",
+    "dB",
+    "m/K",
+    "1/K",
+    "degC",
     "rad/g",
     "rad/Nm",
 }
@@ -42,6 +47,8 @@ MUST_HAVE = {
         "base_compliance",
         "base_drift",
         "exposure_bias",
+        "mount_play",
+        "thermal_image_drift",
     ),
 }
 
@@ -135,9 +142,10 @@ def test_what_an_effect_needs_is_missed_where_it_was_not_logged(label: str) -> N
         value = getattr(views, column)
         bare = replace(views, **{column: np.full_like(value, np.nan)})
         assert column in str(effect.missing(bare))
-    for column in effect.needs_variation:
-        same = np.full_like(getattr(views, column), 0.01)
-        assert "same in every frame" in str(effect.missing(replace(views, **{column: same})))
+    if effect.varies:
+        same = {c: np.full_like(views.logged(c), 0.01) for c in effect.varies if c != "gain_db"}
+        steady = {key: np.full_like(column, 3.0) for key, column in views.extra.items()}
+        assert "did not vary" in str(effect.missing(replace(views, **same, extra=steady)))
     if effect.moving_only:
         assert "moved" in str(effect.missing(replace(views, moving=False)))
 

@@ -165,12 +165,33 @@ def test_a_tool_or_base_frame_that_was_set_midway_is_reported_with_frame_and_siz
     change = rigid.from_vector(np.array([0.01, -0.02, 0.12, 0.0, 0.3, 0.1]))
     poses = CLEAN.base_from_flange.copy()
     poses[at:] = poses[at:] @ change if side == "tool" else change @ poses[at:]
-    found = log_repair_of(replace(CLEAN, base_from_flange=poses))
+    unknown = np.full_like(CLEAN.joints_rad, np.nan)
+    found = log_repair_of(replace(CLEAN, base_from_flange=poses, joints_rad=unknown))
     mixup = only(found)
     assert mixup.name == f"{side}_frame_step"
     assert mixup.alike == ("mount_slip" if side == "tool" else "board_slip",)
     assert mixup.parameters["at_frame"][0] == CLEAN.frame[at]
     np.testing.assert_allclose(found.views.base_from_flange, CLEAN.base_from_flange, atol=2e-3)
+
+
+@pytest.mark.parametrize("side", ["tool", "base"])
+def test_joints_tell_a_small_step_of_tool_or_base_frame_from_something_that_moved(side):
+    change = rigid.from_vector(np.array([0.0, 1e-3, 4e-3, 0.0, 0.0, 1e-3]))
+    poses = CLEAN.base_from_flange.copy()
+    poses[12:] = poses[12:] @ change if side == "tool" else change @ poses[12:]
+    found = log_repair_of(replace(CLEAN, base_from_flange=poses))
+    assert only(found).name == f"{side}_frame_step"
+    assert only(found).alike == ()
+    assert only(found).parameters["at_frame"][0] == CLEAN.frame[12]
+    np.testing.assert_allclose(found.views.base_from_flange, CLEAN.base_from_flange, atol=1e-4)
+
+
+def test_corners_listed_by_columns_are_told_and_listed_by_rows():
+    grid = np.arange(BOARD.corner_count).reshape(BOARD.rows, BOARD.cols)
+    found = log_repair_of(replace(CLEAN, corners_px=CLEAN.corners_px[:, grid.T.ravel()]))
+    assert only(found).name == "corner_order"
+    assert "by columns" in only(found).physics
+    np.testing.assert_array_equal(found.views.corners_px, CLEAN.corners_px)
 
 
 def test_joints_in_degrees_are_read_as_such():

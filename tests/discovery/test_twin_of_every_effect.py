@@ -32,9 +32,11 @@ EFFECTS = {effect.label: effect for effect in catalogue()}
 
 def log_for(effect: Effect) -> Views:
     views = log(FRAMES, moving=effect.moving_only)
-    if effect.needs_variation:
-        exposure_s = np.random.default_rng(4).choice([0.004, 0.008, 0.012, 0.02], len(views))
-        views = replace(views, exposure_s=exposure_s)
+    if "exposure_s" in effect.varies:
+        rng = np.random.default_rng(4)
+        exposure_s = rng.choice([0.004, 0.008, 0.012, 0.02], len(views))
+        gain_db = rng.choice([0.0, 3.0, 6.0], len(views))
+        views = replace(views, exposure_s=exposure_s, extra={"gain_db": gain_db})
     return views
 
 

@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.calibration.frames import CORNERS_NEEDED
 from calib.discovery.log_consistency.mixup import Mixup
 from calib.discovery.log_consistency.odd_frames import OddFrames
+from calib.paper.homography import apply_homography, linear_homography
 from calib.views import Board, FloatArray, Views
 
 
@@ -92,6 +94,56 @@ def find_corner_orders(views: Views, odd: OddFrames, camera_from_board: FloatArr
         mend=_renumbering(found),
         parameters={"frames": (float(len(found)), "frame")},
     )
+
+
+_LISTED_WRONG_PX, _LISTED_BETTER = 3.0, 0.1
+"""By how much numbers of a wrong listing miss a plane, in the median; and what is left of it."""
+
+
+def find_listing(views: Views) -> Mixup | None:
+    """Name corners that are listed by columns in every frame, where the board is not square.
+
+    Parameters
+    ----------
+    views:
+        The frames; no plane shows its corners where such a list says.
+    """
+    board = views.board
+    if board.rows == board.cols:
+        return None
+    logged = _plane_miss_px(views)
+    if logged < _LISTED_WRONG_PX:
+        return None
+    place = np.arange(board.corner_count).reshape(board.cols, board.rows).T.ravel()
+
+    def mend(some: Views, neighbours: Views) -> Views:
+        return replace(
+            some,
+            corners_px=some.corners_px[:, place],
+            corner_sigma_px=some.corner_sigma_px[:, place],
+        )
+
+    if _plane_miss_px(mend(views, views)) > _LISTED_BETTER * logged:
+        return None
+    return Mixup(
+        name="corner_order",
+        physics="The corners of every frame are listed by columns, where the recording says rows.",
+        remedy="List corners row by row, or exchange the board's rows and columns.",
+        mend=mend,
+        parameters={"frames": (float(len(views)), "frame")},
+    )
+
+
+def _plane_miss_px(views: Views) -> float:
+    """Median over frames of how far corners lie from the plane that fits them best."""
+    misses = []
+    for seen, corners in zip(views.seen, views.corners_px, strict=True):
+        if seen.sum() < CORNERS_NEEDED:
+            continue
+        flat, shown = views.board.corners_m[seen, :2], corners[seen]
+        plane = linear_homography(flat, shown)
+        misses.append(float(np.sqrt(np.mean((apply_homography(plane, flat) - shown) ** 2))))
+    return float(np.median(misses)) if misses else 0.0
 
 
 def _renumbering(found: Mapping[int, CornerOrder]) -> Callable[[Views, Views], Views]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -81,9 +82,9 @@ def _steps_at(loop: FloatArray, poses: FloatArray, at: int) -> list[_Step]:
         known = ~longer & np.isfinite(every).all(axis=(1, 2))
         if known.sum() < _FEWEST - 1:
             continue
-        change = _typical(every[known])
+        change = typical_change(every[known])
         change = change if longer is not late else rigid.inverse(change)
-        mended = _mended(poses, late, side, change)
+        mended = mended_poses(poses, late, side, change)
         if longer is late:
             # the longer side judges by its own poses: the reference is the part before the step
             reference = _in_reference(closure, side, change)
@@ -102,13 +103,14 @@ def _in_reference(closure: Closure, side: Side, change: FloatArray) -> Closure:
     return replace(closure, base_from_fixed=change @ closure.base_from_fixed)
 
 
-def _mended(poses: FloatArray, late: BoolArray, side: Side, change: FloatArray) -> FloatArray:
+def mended_poses(poses: FloatArray, late: BoolArray, side: Side, change: FloatArray) -> FloatArray:
+    """(N, 4, 4) with the `late` poses changed on that side."""
     changed = poses @ change if side == "tool" else change @ poses
     return np.where(late[:, None, None], changed, poses)
 
 
-def _typical(changes: FloatArray) -> FloatArray:
-    """(4, 4) the median place, and the mean turn of those near it."""
+def typical_change(changes: FloatArray) -> FloatArray:
+    """(4, 4) of (N, 4, 4): the median place, and the mean turn of those near it."""
     out = np.eye(4)
     turns = Rotation.from_matrix(changes[:, :3, :3])
     apart = [float(np.median((turns[k].inv() * turns).magnitude())) for k in range(len(changes))]
@@ -130,17 +132,38 @@ def _mean_miss(closure: Closure) -> float:
 def _mixup(step: _Step, frame: int, logged: Closure) -> Mixup:
     def mend(some: Views, neighbours: Views) -> Views:
         late = np.asarray(some.frame >= frame)
-        mended = _mended(some.base_from_flange, late, step.side, step.change)
+        mended = mended_poses(some.base_from_flange, late, step.side, step.change)
         return replace(some, base_from_flange=mended)
 
-    size = rigid.to_vector(step.change)
+    before = (logged.typical_angle_rad, logged.typical_distance_m)
+    found = frame_step(step.side, frame, step.change, mend, (before, (step.miss, step.miss)))
+    return replace(found, physics=f"{found.physics[:-1]}; or {_ALIKE[step.side]} was moved.")
+
+
+def frame_step(
+    side: Side,
+    frame: int,
+    change: FloatArray,
+    mend: Callable[[Views, Views], Views],
+    evidence: tuple[tuple[float, float], tuple[float, float]],
+) -> Mixup:
+    """The mix-up of a tool or base frame that was set anew.
+
+    Parameters
+    ----------
+    side, frame, change:
+        Poses from that frame on, times `change` (4, 4) on that side, agree with the rest.
+    mend, evidence:
+        As in `Mixup`.
+    """
+    size = rigid.to_vector(change)
     names = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
     far, turn = float(np.linalg.norm(size[:3])), float(np.rad2deg(np.linalg.norm(size[3:])))
     return Mixup(
-        name=f"{step.side}_frame_step",
+        name=f"{side}_frame_step",
         physics=(
-            f"From frame {frame} on the poses are of another {_WORDS[step.side]}, {far * 1e3:.0f}"
-            f" mm and {turn:.1f} degrees from the one before; or {_ALIKE[step.side]} was moved."
+            f"From frame {frame} on the poses are of another {_WORDS[side]}, {far * 1e3:.1f} mm"
+            f" and {turn:.1f} degrees from the one before."
         ),
         remedy="Set tool and user frame once, before the run; log the flange and no tool.",
         mend=mend,
@@ -148,7 +171,7 @@ def _mixup(step: _Step, frame: int, logged: Closure) -> Mixup:
             "at_frame": (float(frame), "frame"),
             **{n: (float(v), n.rsplit("_", 1)[1]) for n, v in zip(names, size, strict=True)},
         },
-        alike=("mount_slip" if step.side == "tool" else "board_slip",),
+        alike=("mount_slip" if side == "tool" else "board_slip",),
         apart="the controller's settings and the cell itself: what was moved leaves a mark there",
-        evidence=((logged.typical_angle_rad, logged.typical_distance_m), (step.miss, step.miss)),
+        evidence=evidence,
     )

@@ -143,6 +143,24 @@ def _(p: Numbers, scene: Scene) -> None:
     scene.mounted = anp.dot(scene.mounted, formulas.rigid(_warmth(p, scene) * _six(p)))
 
 
+@_of("thermal_mount_drift:temperature")
+def _(p: Numbers, scene: Scene) -> None:
+    warmer = scene.logged("temperature_c") - p["at_temperature_c"]
+    growth = warmer * anp.stack([p[f"{axis}_m_per_K"] for axis in "xyz"])
+    scene.mounted = anp.dot(formulas.rigid(anp.concatenate([growth, np.zeros(3)])), scene.mounted)
+
+
+@_of("mount_play")
+def _(p: Numbers, scene: Scene) -> None:
+    down = scene.down_in(scene.flange)
+    turned = anp.arctan2(down[1], down[0]) - p["towards_rad"]
+    beyond = (0.5 * np.pi - anp.abs(anp.arctan2(anp.sin(turned), anp.cos(turned)))) / p[
+        "unseen_rad"
+    ]
+    stop = formulas.rigid(anp.clip(beyond, -1.0, 1.0) * _six(p))
+    scene.mounted = anp.dot(scene.mounted, stop)
+
+
 @_of("board_slip")
 def _(p: Numbers, scene: Scene) -> None:
     if scene.logged("frame") >= p["at_frame"]:
@@ -302,6 +320,18 @@ def _(p: Numbers, scene: Scene) -> None:
     _add(scene, "v0_px", p["px_per_g"] * down[1])
 
 
+@_of("thermal_image_drift")
+def _(p: Numbers, scene: Scene) -> None:
+    for axis in "uv":
+        _add(scene, f"{axis}0_px", p[f"{axis}_px"] * _warmth(p, scene))
+
+
+@_of("thermal_focal_drift:temperature")
+def _(p: Numbers, scene: Scene) -> None:
+    warmer = scene.logged("temperature_c") - p["at_temperature_c"]
+    _scale_focal(scene, 1.0 + p["relative_per_K"] * warmer)
+
+
 @_of("sensor_tilt")
 def _(p: Numbers, scene: Scene) -> None:
     _add(scene, "tilt_x_rad", p["tilt_x_rad"])
@@ -314,7 +344,9 @@ def _(p: Numbers, scene: Scene) -> None:
     pose, sidewards = scene.pose(), scene.points - middle
     farthest_m = anp.sqrt(anp.max(anp.sum(sidewards**2, axis=1)))
     farthest_px = scene.optics["alpha_px"] * farthest_m / scene.depth(pose)
-    share = p["px_per_s"] * (scene.logged("exposure_s") - p["at_exposure_s"]) / farthest_px
+    brighter = p["px_per_s"] * (scene.logged("exposure_s") - p["at_exposure_s"])
+    gain_db = scene.views.extra["gain_db"][scene.frame]
+    share = (brighter + p["px_per_dB"] * (gain_db - p["at_gain_dB"])) / farthest_px
     centre = formulas.swept_pixel(scene.optics, formulas.camera_coordinates(pose, middle))
     scene.found_at = lambda pixels: pixels + share * (pixels - centre)
 

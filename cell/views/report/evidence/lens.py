@@ -60,13 +60,15 @@ def by_focus_direction(data: ReportData, effect: Mapping[str, Any]) -> Figure | 
 
 
 def by_exposure(data: ReportData, effect: Mapping[str, Any]) -> Figure | None:
-    """Depth error against the exposure."""
-    shifts, exposure_ms = shifts_m(data, effect), data.views.exposure_s * 1e3
-    if shifts is None or not np.isfinite(exposure_ms).any():
+    """Depth error against the exposure, or against the gain where that does more."""
+    shifts = shifts_m(data, effect)
+    by_gain = "px_per_dB" in effect["parameters"] and "px_per_s" not in effect["parameters"]
+    along = data.views.logged("gain_db") if by_gain else data.views.exposure_s * 1e3
+    if shifts is None or not np.isfinite(along).any():
         return None
     figure, axes = panels(6.0, 3.2)
-    _depth(axes[0], shifts, exposure_ms)
-    axes[0].set(xlabel="exposure (ms)")
+    _depth(axes[0], shifts, along)
+    axes[0].set(xlabel="gain (dB)" if by_gain else "exposure (ms)")
     legend_below(figure, axes)
     return figure
 

@@ -81,8 +81,9 @@ register(
     "exposure_bias detector",
     Picture(
         lens.by_exposure,
-        "The board seems the nearer the longer the exposure before, and at no exposure after.",
-        "the exposure of each frame, its camera pose by its picture and by the robot",
+        "The board seems the nearer the longer the exposure (or the higher the gain) before, "
+        "and at no exposure after.",
+        "exposure or gain of each frame, its camera pose by its picture and by the robot",
     ),
 )
 register(
@@ -111,7 +112,7 @@ register(
     ),
 )
 register(
-    "mount_flex lens_sag mount",
+    "mount_flex mount_play lens_sag mount",
     Picture(
         mount.error_against_gravity,
         "The camera's error follows the direction in which it feels gravity without the effect, "
@@ -120,7 +121,7 @@ register(
     ),
 )
 register(
-    "thermal_mount_drift thermal_focal_drift thermal_board_growth base_drift",
+    "thermal_mount_drift thermal_focal_drift thermal_image_drift thermal_board_growth base_drift",
     Picture(
         order.drift,
         "The error moves steadily with time or temperature before, and not after.",
