@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from calib.calibration.result import Calibration, Solution
     from calib.chain.model import CellModel, predict
     from calib.chain.optics import OPTICS, optics_row
-    from calib.chain.projection import project
+    from calib.chain.sight import project, unproject
     from calib.detection import Detection, Rejected, detect
     from calib.discovery.diagnose import diagnose
     from calib.discovery.diagnosis import Diagnosis
@@ -52,6 +52,7 @@ __all__ = [
     "optics_row",
     "predict",
     "project",
+    "unproject",
 ]
 
 _HOME = {
@@ -71,7 +72,8 @@ _HOME = {
     "diagnose": "calib.discovery.diagnose",
     "optics_row": "calib.chain.optics",
     "predict": "calib.chain.model",
-    "project": "calib.chain.projection",
+    "project": "calib.chain.sight",
+    "unproject": "calib.chain.sight",
 }
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from calib.chain.model import CellModel, evaluate
+from calib.chain.sight import in_domain
 from calib.chain.state import ChainState
 from calib.views import BoolArray, FloatArray, Views
 from sim.arm import Repeatability
@@ -80,13 +81,13 @@ def true_corners(cell: SimulatedCell, log: Views) -> FloatArray:
 
 
 def _visible(state: ChainState, corners_px: FloatArray, log: Views) -> BoolArray:
-    """(N, M) corners in front of the camera, on the printed side, inside the picture."""
+    """(N, M) corners that the lens shows, on the printed side, inside the picture."""
     pose = state.camera_from_board
-    depth = pose[:, None, 2, :3] @ state.points_m.T + pose[:, 2, 3, None, None]
+    in_camera = state.points_m @ np.swapaxes(pose[:, :3, :3], 1, 2) + pose[:, None, :3, 3]
     facing = np.einsum("ni,ni->n", pose[:, :3, 2], pose[:, :3, 3]) > 0
     size = np.array([log.width_px, log.height_px])
     inside = ((corners_px > -0.5) & (corners_px < size - 0.5)).all(axis=2)
-    seen = inside & (depth[:, 0] > 0) & facing[:, None]
+    seen = inside & in_domain(state.optics, in_camera) & facing[:, None]
     if not log.board.identified:
         seen &= seen.all(axis=1, keepdims=True)
     return np.asarray(seen)

@@ -36,6 +36,7 @@ OPTICS: tuple[str, ...] = (
     "sweep_rz_rad",
     "height_px",
     "pose_row",
+    "equidistant",
 )
 """Names of the K columns of an optics array.
 
@@ -45,8 +46,13 @@ the entrance pupil along the axis by that much per squared radian of field angle
 the thickness of a plane-parallel glass of index `WINDOW_INDEX` in front of the lens. The sweep is
 how the board moves in the camera's frame while a rolling shutter reads from the first row to the
 last of `height_px` rows; `pose_row` is how far below the middle, as a share of the rows, the row
-lies at whose moment the pose stands.
+lies at whose moment the pose stands. `equidistant` is one for a wide lens whose ideal image grows
+with the angle from the axis instead of its tangent; distortion then acts on that image, k1 to k4
+are Kannala and Brandt's terms (OpenCV's `fisheye`), and k5 and k6 are not looked at.
 """
+
+NEVER_FREE = ("height_px", "pose_row", "equidistant")
+"""Columns that say what a camera is: no pixel has a derivative by them."""
 
 COLUMN = {name: index for index, name in enumerate(OPTICS)}
 

@@ -3,11 +3,11 @@
 The one projection of the project: simulator, baseline fits, joint fit and discovery all call it.
 Equation 1 of the paper with Brown's distortion (Brown 1966; the rational, thin-prism and tilted
 forms as in OpenCV's `calib3d` documentation), an entrance pupil that moves with the field angle,
-a plane-parallel window, and a rolling shutter. A pose is perturbed on the camera's side:
+a plane-parallel window, and a rolling shutter. The ideal image that is then distorted is a
+perspective or an equidistant one (`calib.chain.ideal`); the latter with four radial terms is
+Kannala and Brandt's camera (2006), OpenCV's `fisheye`. A pose is perturbed on the camera's side:
 `camera_from_board <- (1 + increment) camera_from_board`, increment = (metres, radians).
-
-Corners go through in blocks, each quantity in a row of its own: straight loops over rows at a fixed
-distance are what LLVM turns into instructions for four or eight corners at once.
+Corners go through in blocks (`calib.chain.rows`).
 """
 
 from __future__ import annotations
@@ -17,37 +17,57 @@ import math
 import numpy as np
 from numba import njit
 
-from calib.chain.optics import COLUMN, OPTICS, WINDOW_INDEX
+from calib.chain.ideal import equidistant, perspective
+from calib.chain.optics import COLUMN, WINDOW_INDEX
+from calib.chain.rows import (
+    BLOCK,
+    JAC,
+    LANES,
+    LATE,
+    OPTIC,
+    PX,
+    PY,
+    PZ,
+    ROW,
+    RX,
+    RY,
+    RZ,
+    S0,
+    S1,
+    S2,
+    S3,
+    S4,
+    US,
+    VS,
+    WORK,
+    XD,
+    YD,
+    ZS,
+    A,
+    B,
+    G,
+    H,
+    K,
+    S,
+    U,
+    V,
+    X,
+    Y,
+    Z,
+)
 from calib.views import FloatArray
 
-K = len(OPTICS)
 NOTHING, BROWN, EVERYTHING = 0, 1, 2
 """Which derivatives a block gives: none; by the pose and the columns up to the thin prism; by every
 column. The rare ones (tilt, pupil, window, sweep) cost more than all others together."""
 
 FIRST_RARE, LAST_RARE = COLUMN["tilt_x_rad"], COLUMN["sweep_rz_rad"]
 FIRST_SWEEP, HEIGHT, POSE_ROW = COLUMN["sweep_x_m"], COLUMN["height_px"], COLUMN["pose_row"]
+EQUIDISTANT = COLUMN["equidistant"]
 ROW_STEPS, ROW_SETTLED_PX = 40, 1e-11
 """A board that moves by a tenth of the picture while it is read needs about a dozen steps."""
 
 N2 = WINDOW_INDEX * WINDOW_INDEX
-
-BLOCK = 64
-"""Corners that go through together: their rows stay in the fastest cache."""
-LANES = 8
-"""Corners that an instruction may take at once; blocks are filled up to a multiple of it."""
-# rows of a block's `work`: the point in the board's frame, in the camera's, there with the board
-# at rest; its depth as the pinhole sees it, with derivatives by x, y, z, pupil and window; the
-# pixel; how late its row is read; the pixel's derivatives by the depth; the distorted point
-PX, PY, PZ, X, Y, Z, RX, RY, RZ, ZS, S0, S1, S2, S3, S4, U, V, LATE, US, VS, XD, YD = (
-    BLOCK * k for k in range(22)
-)
-WORK = 22 * BLOCK
-# rows of its derivatives `jac`, by the pose and by the optics: of u in the first half, of v in the
-# second
-ROW = 2 * BLOCK
-OPTIC = 6 * ROW
-JAC = (6 + K) * ROW
 
 
 @njit(cache=True, error_model="numpy")
@@ -95,6 +115,16 @@ def _depth(o, count, work, derive):  # type: ignore[no-untyped-def]
         work[ZS + j], work[S0 + j], work[S1 + j], work[S2 + j], work[S3 + j], work[S4 + j] = seen
 
 
+@njit(cache=True, error_model="numpy")
+def _image(o, count, work, derive):  # type: ignore[no-untyped-def]
+    """Where the ideal image has the corners in the camera's frame."""
+    _depth(o, count, work, derive)
+    if o[EQUIDISTANT] != 0.0:
+        equidistant(count, work)
+    else:
+        perspective(count, work)
+
+
 @njit(cache=True, error_model="numpy", inline="always")
 def _tilted(cx, sx, cy, sy, xd, yd):  # type: ignore[no-untyped-def]
     """Point on the tilted sensor; one over its depth there.
@@ -106,13 +136,21 @@ def _tilted(cx, sx, cy, sy, xd, yd):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _distorted(a, b, k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4):  # type: ignore[no-untyped-def]
+def _radial_terms(o):  # type: ignore[no-untyped-def]
+    """The fourth radial term of an equidistant image; the rational ones of a perspective one."""
+    if o[EQUIDISTANT] != 0.0:
+        return o[10], 0.0, 0.0, 0.0
+    return 0.0, o[10], o[11], o[12]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _distorted(a, b, k1, k2, p1, p2, k3, n4, k4, k5, k6, s1, s2, s3, s4):  # type: ignore[no-untyped-def]
     """A distorted point; its radial factor and the inverse of that one's denominator."""
     r2 = a * a + b * b
     r4 = r2 * r2
     r6 = r4 * r2
     per_den = 1.0 / (1.0 + k4 * r2 + k5 * r4 + k6 * r6)
-    rad = (1.0 + k1 * r2 + k2 * r4 + k3 * r6) * per_den
+    rad = (1.0 + k1 * r2 + k2 * r4 + k3 * r6 + n4 * r4 * r4) * per_den
     xd = a * rad + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a) + s1 * r2 + s2 * r4
     yd = b * rad + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b + s3 * r2 + s4 * r4
     return xd, yd, rad, per_den
@@ -122,13 +160,13 @@ def _distorted(a, b, k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4):  # type: i
 def _see(o, count, work):  # type: ignore[no-untyped-def]
     """Pixels of corners in the camera's frame."""
     alpha, beta, skew, u0, v0 = o[0], o[1], o[2], o[3], o[4]
-    k1, k2, p1, p2, k3, k4, k5, k6 = o[5], o[6], o[7], o[8], o[9], o[10], o[11], o[12]
+    k1, k2, p1, p2, k3 = o[5], o[6], o[7], o[8], o[9]
+    n4, k4, k5, k6 = _radial_terms(o)
     s1, s2, s3, s4 = o[13], o[14], o[15], o[16]
     cx, sx, cy, sy = math.cos(o[17]), math.sin(o[17]), math.cos(o[18]), math.sin(o[18])
     for j in range(count):
-        per_z = 1.0 / work[ZS + j]
-        a, b = work[X + j] * per_z, work[Y + j] * per_z
-        xd, yd, _, _ = _distorted(a, b, k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4)
+        a, b = work[A + j], work[B + j]
+        xd, yd, _, _ = _distorted(a, b, k1, k2, p1, p2, k3, n4, k4, k5, k6, s1, s2, s3, s4)
         xt, yt, _ = _tilted(cx, sx, cy, sy, xd, yd)
         work[U + j] = alpha * xt + skew * yt + u0
         work[V + j] = beta * yt + v0
@@ -139,14 +177,16 @@ def _see(o, count, work):  # type: ignore[no-untyped-def]
 def _differentiate(o, count, work, jac):  # type: ignore[no-untyped-def]  # noqa: PLR0915
     """Pixels, and their derivatives by the pose and by the columns up to the thin prism."""
     alpha, beta, skew, u0, v0 = o[0], o[1], o[2], o[3], o[4]
-    k1, k2, p1, p2, k3, k4, k5, k6 = o[5], o[6], o[7], o[8], o[9], o[10], o[11], o[12]
+    k1, k2, p1, p2, k3 = o[5], o[6], o[7], o[8], o[9]
+    n4, k4, k5, k6 = _radial_terms(o)
     s1, s2, s3, s4 = o[13], o[14], o[15], o[16]
     cx, sx, cy, sy = math.cos(o[17]), math.sin(o[17]), math.cos(o[18]), math.sin(o[18])
+    wide = 1.0 if o[EQUIDISTANT] != 0.0 else 0.0
+    rational = 1.0 - wide
     for j in range(count):
         x, y, z = work[X + j], work[Y + j], work[Z + j]
-        per_z = 1.0 / work[ZS + j]
-        a, b = x * per_z, y * per_z
-        xd, yd, rad, per_den = _distorted(a, b, k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4)
+        a, b = work[A + j], work[B + j]
+        xd, yd, rad, per_den = _distorted(a, b, k1, k2, p1, p2, k3, n4, k4, k5, k6, s1, s2, s3, s4)
         xt, yt, per_w = _tilted(cx, sx, cy, sy, xd, yd)
         work[U + j] = alpha * xt + skew * yt + u0
         work[V + j] = beta * yt + v0
@@ -158,7 +198,7 @@ def _differentiate(o, count, work, jac):  # type: ignore[no-untyped-def]  # noqa
         # (xd, yd) by (a, b)
         r2 = a * a + b * b
         r4 = r2 * r2
-        num_r = k1 + 2.0 * k2 * r2 + 3.0 * k3 * r4
+        num_r = k1 + 2.0 * k2 * r2 + 3.0 * k3 * r4 + 4.0 * n4 * r4 * r2
         den_r = k4 + 2.0 * k5 * r2 + 3.0 * k6 * r4
         rad_r = (num_r - rad * den_r) * per_den
         prism_x, prism_y = s1 + 2.0 * s2 * r2, s3 + 2.0 * s4 * r2
@@ -169,31 +209,34 @@ def _differentiate(o, count, work, jac):  # type: ignore[no-untyped-def]  # noqa
         yb = rad + 2.0 * b * b * rad_r + 6.0 * p1 * b + 2.0 * p2 * a + 2.0 * b * prism_y
         ua, ub = ux * xa + uy * ya, ux * xb + uy * yb
         va, vb = vx * xa + vy * ya, vx * xb + vy * yb
-        # (a, b) by the depth is -(a, b)/depth
-        us, vs = -(ua * a + ub * b) * per_z, -(va * a + vb * b) * per_z
+        # (a, b) = (x, y) g by x and y at this depth, and by the depth
+        g, h, s = work[G + j], work[H + j], work[S + j]
+        uo, vo = ua * x + ub * y, va * x + vb * y
+        uh, vh, us, vs = uo * h, vo * h, uo * s, vo * s
         dx, dy, dz = work[S0 + j], work[S1 + j], work[S2 + j]
-        u_x, u_y, u_z = ua * per_z + us * dx, ub * per_z + us * dy, us * dz
-        v_x, v_y, v_z = va * per_z + vs * dx, vb * per_z + vs * dy, vs * dz
+        u_x, u_y, u_z = ua * g + uh * x + us * dx, ub * g + uh * y + us * dy, us * dz
+        v_x, v_y, v_z = va * g + vh * x + vs * dx, vb * g + vh * y + vs * dy, vs * dz
         work[US + j], work[VS + j], work[XD + j], work[YD + j] = us, vs, xd, yd
-        for h, gx, gy, gz in ((0, u_x, u_y, u_z), (BLOCK, v_x, v_y, v_z)):
-            jac[h + j] = gx
-            jac[ROW + h + j] = gy
-            jac[2 * ROW + h + j] = gz
-            jac[3 * ROW + h + j] = gz * y - gy * z
-            jac[4 * ROW + h + j] = gx * z - gz * x
-            jac[5 * ROW + h + j] = gy * x - gx * y
-        for h, at_x, at_y in ((0, ux, uy), (BLOCK, vx, vy)):
+        for half, gx, gy, gz in ((0, u_x, u_y, u_z), (BLOCK, v_x, v_y, v_z)):
+            at = half + j
+            jac[at] = gx
+            jac[ROW + at] = gy
+            jac[2 * ROW + at] = gz
+            jac[3 * ROW + at] = gz * y - gy * z
+            jac[4 * ROW + at] = gx * z - gz * x
+            jac[5 * ROW + at] = gy * x - gx * y
+        for half, at_x, at_y in ((0, ux, uy), (BLOCK, vx, vy)):
             r6 = r4 * r2
             radial = (at_x * a + at_y * b) * per_den
-            at = OPTIC + h + j
+            at = OPTIC + half + j
             jac[at + 5 * ROW] = radial * r2
             jac[at + 6 * ROW] = radial * r4
             jac[at + 7 * ROW] = at_x * 2.0 * a * b + at_y * (r2 + 2.0 * b * b)
             jac[at + 8 * ROW] = at_x * (r2 + 2.0 * a * a) + at_y * 2.0 * a * b
             jac[at + 9 * ROW] = radial * r6
-            jac[at + 10 * ROW] = -radial * rad * r2
-            jac[at + 11 * ROW] = -radial * rad * r4
-            jac[at + 12 * ROW] = -radial * rad * r6
+            jac[at + 10 * ROW] = radial * (wide * r4 * r4 - rational * rad * r2)
+            jac[at + 11 * ROW] = -rational * radial * rad * r4
+            jac[at + 12 * ROW] = -rational * radial * rad * r6
             jac[at + 13 * ROW] = at_x * r2
             jac[at + 14 * ROW] = at_x * r4
             jac[at + 15 * ROW] = at_y * r2
@@ -263,7 +306,7 @@ def _follow_rows(o, count, work):  # type: ignore[no-untyped-def]
             work[Z + j] = z + late * (tz + rx * y - ry * x)
             work[LATE + j] = late
             work[PX + j] = work[V + j]
-        _depth(o, count, work, BROWN)
+        _image(o, count, work, BROWN)
         _see(o, count, work)
         for j in range(count):
             moved_px = max(moved_px, abs(work[V + j] - work[PX + j]))
@@ -309,12 +352,12 @@ def _corners(o, pose, count, work, jac, derive):  # type: ignore[no-untyped-def]
     `count` must be a multiple of `LANES`. The rare columns' derivatives need `EVERYTHING`.
     """
     _place(pose, count, work)
-    _depth(o, count, work, derive)
+    _image(o, count, work, derive)
     if np.any(o[FIRST_SWEEP : LAST_RARE + 1] != 0.0):
         _see(o, count, work)
         _follow_rows(o, count, work)
         if derive != NOTHING:
-            _depth(o, count, work, derive)
+            _image(o, count, work, derive)
             _differentiate(o, count, work, jac)
             _differentiate_rare(o, count, work, jac)
             _differentiate_moving(o, count, work, jac)

@@ -9,21 +9,15 @@ import numpy as np
 from numba import njit
 
 from calib.chain.projection import (
-    BLOCK,
     BROWN,
     EVERYTHING,
     FIRST_RARE,
-    JAC,
     LAST_RARE,
-    OPTIC,
-    ROW,
-    WORK,
-    U,
-    V,
     _corners,
     _has_rare,
     _take,
 )
+from calib.chain.rows import BLOCK, JAC, OPTIC, ROW, WORK, U, V
 from calib.views import FloatArray
 
 LEFT, RIGHT = 2, 4

@@ -89,6 +89,11 @@ def _model(cell: CellFile, truth: Simulation) -> CellModel:
             raise InputError(
                 f"cell {cell.name}: simulation.optics.{name}: {truth.optics[name]:g} is not above 0"
             )
+    if truth.optics.get("equidistant", 0.0) not in (0.0, 1.0):
+        raise InputError(
+            f"cell {cell.name}: simulation.optics.equidistant: {truth.optics['equidistant']:g} is"
+            " neither 0 (perspective lens) nor 1 (wide lens, image height by the angle)"
+        )
     where = f"cell {cell.name}: simulation.effects"
     return CellModel(
         optics=optics_row(**{"height_px": cell.camera.height, **truth.optics}),

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from calib.chain.projection import project_with_jacobians
+from calib.chain.sight import unproject
 from calib.views import Board, BoolArray, FloatArray
 
 Image = NDArray[np.float32]
@@ -135,6 +136,7 @@ def look(
     if straightened is not None:
         target = straightened(target)
     s, t, met = _newton(surface, optics, camera_from_board, target)
+    s, t = np.where(met, s, 0.0), np.where(met, t, 0.0)
     point, _, _ = surface.point(s, t)
     depth = point @ camera_from_board[2, :3] + camera_from_board[2, 3]
     met &= depth > 0
@@ -157,7 +159,7 @@ def _newton(
         with np.errstate(divide="ignore", invalid="ignore"):
             s[open_] += (miss[:, 0] * to_t[:, 1] - miss[:, 1] * to_t[:, 0]) / det
             t[open_] += (to_s[:, 0] * miss[:, 1] - to_s[:, 1] * miss[:, 0]) / det
-        going = (misfit[open_] > _TOLERANCE_PX) & np.isfinite(s[open_] + t[open_])
+        going = (misfit[open_] > _TOLERANCE_PX) & np.isfinite(s[open_]) & np.isfinite(t[open_])
         open_ = open_[going]
         if len(open_) == 0:
             break
@@ -176,11 +178,9 @@ def _derivatives(
 def _first_guess(
     board: Board, optics: FloatArray, pose: FloatArray, target_px: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Where an undistorted camera's lines of sight meet the flat board."""
-    alpha, beta, skew, u0, v0 = optics[:5]
-    y = (target_px[:, 1] - v0) / beta
-    x = (target_px[:, 0] - u0 - skew * y) / alpha
+    """Where the lines of sight meet the flat board; NaN for a pixel that has none."""
     plane = np.linalg.inv(np.stack([pose[:3, 0], pose[:3, 1], pose[:3, 3]], axis=1))
-    hit = np.stack([x, y, np.ones_like(x)], axis=1) @ plane.T
-    hit = hit[:, :2] / hit[:, 2:]
+    hit = unproject(optics, target_px) @ plane.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        hit = hit[:, :2] / hit[:, 2:]
     return hit[:, 0] / board.square_m, hit[:, 1] / board.square_m

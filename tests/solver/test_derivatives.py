@@ -16,7 +16,7 @@ from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue
 from calib.chain.empirical import SITES, Curve, present_curve, span
 from calib.chain.model import CellModel, evaluate, predict
-from calib.chain.optics import COLUMN, OPTICS
+from calib.chain.optics import COLUMN, NEVER_FREE, OPTICS
 from calib.chain.projection import project_with_jacobians
 from calib.solver.unknowns import Dependence, Unknown, dependence, unknowns_of
 from calib.views import FloatArray, Mount, Views
@@ -32,9 +32,7 @@ MOUNTS: tuple[Mount, ...] = ("eye_in_hand", "eye_to_hand")
 SHARE = 3e-5
 """Rounding in differences of pixels is up to 5e-6 of a derivative; a term left out is far more."""
 LENS = ("alpha_px", "beta_px", "u0_px", "v0_px", "k1", "k2")
-WHOLE_LENS = tuple(
-    c for c in OPTICS if c not in ("height_px", "pose_row") and not c.startswith("sweep")
-)
+WHOLE_LENS = tuple(c for c in OPTICS if c not in NEVER_FREE and not c.startswith("sweep"))
 
 
 def _pixels_by(found: Dependence) -> tuple[FloatArray, FloatArray]:

@@ -218,7 +218,8 @@ class Simulation(Part):
     fixed: Pose
     """As in `layout`, exactly."""
     optics: dict[str, Finite]
-    """Columns of the chain's optics: alpha_px, beta_px, skew_px, u0_px, v0_px, k1, k2, ..."""
+    """Columns of the chain's optics: alpha_px, beta_px, skew_px, u0_px, v0_px, k1, k2, ...; with
+    `equidistant: 1` a wide lens whose image grows with the angle (Kannala and Brandt, k1 to k4)."""
     effects: tuple[EffectFile, ...] = ()
     """What a plain model leaves out."""
     noise: Noise = Noise()

@@ -72,11 +72,17 @@ def pixel(o: dict[str, Array], p: Array) -> Array:
     inside = anp.arcsin(anp.sin(angle) / INDEX)
     window = o["window_m"] * (1.0 - anp.tan(inside) / anp.tan(angle))
     depth = p[2] + o["pupil_m_rad2"] * angle**2 - window
-    x, y = p[0] / depth, p[1] / depth
-    r2 = x * x + y * y
-    radial = (1 + o["k1"] * r2 + o["k2"] * r2**2 + o["k3"] * r2**3) / (
-        1 + o["k4"] * r2 + o["k5"] * r2**2 + o["k6"] * r2**3
-    )
+    if o["equidistant"]:
+        # Kannala and Brandt 2006, Eq. 6 without its outer factor: the angle, along the azimuth
+        azimuth, r = anp.arctan2(p[1], p[0]), anp.arccos(depth / anp.sqrt(radius**2 + depth**2))
+        x, y, r2 = r * anp.cos(azimuth), r * anp.sin(azimuth), r**2
+        radial = 1 + o["k1"] * r2 + o["k2"] * r2**2 + o["k3"] * r2**3 + o["k4"] * r2**4
+    else:
+        x, y = p[0] / depth, p[1] / depth
+        r2 = x * x + y * y
+        radial = (1 + o["k1"] * r2 + o["k2"] * r2**2 + o["k3"] * r2**3) / (
+            1 + o["k4"] * r2 + o["k5"] * r2**2 + o["k6"] * r2**3
+        )
     xd = x * radial + 2 * o["p1"] * x * y + o["p2"] * (r2 + 2 * x * x)
     yd = y * radial + o["p1"] * (r2 + 2 * y * y) + 2 * o["p2"] * x * y
     xd = xd + o["s1"] * r2 + o["s2"] * r2**2
