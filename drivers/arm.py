@@ -63,18 +63,46 @@ class MoveTarget:
 
 
 class Arm(Protocol):
-    """A robot arm. No call but `connect` may block longer than 50 ms."""
+    """A robot arm. No call but `connect` may block longer than 50 ms.
+
+    What every driver raises stands here; a driver's own docstring adds only what is its maker's.
+    """
 
     tried_on_hardware: bool
 
     def connect(self) -> None:
-        """Open the link and check that the arm may be driven; raises `DeviceError`."""
+        """Open every link and check that the arm may be driven.
+
+        A link from before is closed first. Nothing stays open where it fails.
+
+        Raises
+        ------
+        DeviceUnreachable
+            No answer.
+        DeviceRefused
+            The controller may not be driven from here, or runs a program of somebody else's.
+        ArmStopped
+            Powered off, or stopped for safety.
+        """
 
     def state(self) -> ArmState:
-        """The newest atomic reading; raises `DeviceUnreachable` when it is stale."""
+        """The newest atomic reading; raises `DeviceUnreachable` when it is stale.
+
+        Once the link was lost the arm has a fault until the next `connect`.
+        """
 
     def start_move(self, target: MoveTarget) -> None:
-        """Begin a move and return at once; raises `SafetyError` for one it will not make."""
+        """Begin a move and return at once.
+
+        Raises
+        ------
+        SafetyError
+            It will not make this move; see `drivers.targets.check_target`.
+        ArmStopped
+            The arm has a fault.
+        DeviceRefused
+            It still moves.
+        """
 
     def stop(self) -> None:
         """Stop now; returns once the order is out. Idempotent. Raises `StopFailed`."""

@@ -1,14 +1,14 @@
-"""Refuses a move target that no driver would make, before anything moves."""
+"""Refuses a move that no driver would make, before anything moves."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from drivers.arm import MoveTarget
-from drivers.errors import SafetyError
+from drivers.errors import ArmStopped, DeviceRefused, SafetyError
 
 
 def check_target(
@@ -37,6 +37,17 @@ def check_target(
         _check_joints(target.joints_rad, joint_limits_rad)
     elif not np.isfinite(target.base_from_flange.as_matrix()).all():  # type: ignore[union-attr]
         raise SafetyError("the flange pose of a move is not finite")
+
+
+def check_ready(fault: str | None, moving: bool, named: Callable[[str], str]) -> None:
+    """Raise `ArmStopped` for an arm with a fault and `DeviceRefused` for one that still moves.
+
+    `named` puts the device's name before a message.
+    """
+    if fault is not None:
+        raise ArmStopped(named(fault))
+    if moving:
+        raise DeviceRefused(named("still moving: wait until it is steady, or stop it first"))
 
 
 def _check_speed(name: str, value: float, limit: float, unit: str) -> None:

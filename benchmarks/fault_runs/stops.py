@@ -58,7 +58,7 @@ class Kind:
     either:
         Makers of the arms with which it may be confirmed by something else that is true.
     alarm:
-        What the operator is informed where it was not, or did not last.
+        What the operator reads where it was not, or did not last.
     """
 
     name: str

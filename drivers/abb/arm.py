@@ -13,7 +13,7 @@ from drivers.abb.supervisor import Supervisor
 from drivers.abb.transport import generation_of, resolved
 from drivers.arm import ArmState, Motion, MoveTarget
 from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable, StopFailed
-from drivers.targets import check_target
+from drivers.targets import check_ready, check_target
 from drivers.untried import warn_untried
 
 
@@ -37,17 +37,11 @@ class ABBArm:
         self._egm: EgmReader | None = None
 
     def connect(self) -> None:
-        """Log in, check that the arm may be driven, and begin to poll.
+        """Log in and begin to poll; see `drivers.arm.Arm`.
 
-        Raises
-        ------
-        DeviceUnreachable
-            No answer.
-        DeviceRefused
-            No password or a wrong one, a certificate that is not trusted, a RAPID program is
-            running already, or no task there watches the link.
-        ArmStopped
-            Not in automatic mode, motors off, or stopped for safety.
+        Refused, too, without a password or with a wrong one, for a certificate that is not
+        trusted, and where no task there watches the link. Stopped is also one that is not in
+        automatic mode.
         """
         self.close()
         atexit.register(self.close)
@@ -63,10 +57,7 @@ class ABBArm:
             raise
 
     def state(self) -> ArmState:
-        """Return the newest reading: EGM's while a program runs and it comes, else RWS's.
-
-        Raises `DeviceUnreachable` when it is stale.
-        """
+        """EGM's reading while a program runs and it comes, else RWS's; see `drivers.arm.Arm`."""
         supervisor = self._connected()
         reading = self._reading(supervisor)
         return ArmState(
@@ -91,10 +82,7 @@ class ABBArm:
         )
         supervisor = self._connected()
         self._reading(supervisor)
-        if supervisor.fault is not None:
-            raise ArmStopped(self._named(supervisor.fault))
-        if supervisor.busy:
-            raise DeviceRefused(self._named("still moving: wait until it is steady, or stop it"))
+        check_ready(supervisor.fault, supervisor.busy, self._named)
         supervisor.order(target)
 
     def stop(self) -> None:
@@ -107,7 +95,7 @@ class ABBArm:
             )
 
     def close(self) -> None:
-        """Stop and let go of the controller. Idempotent."""
+        """See `drivers.arm.Arm`."""
         atexit.unregister(self.close)
         if self._supervisor is not None:
             self._supervisor.close()

@@ -15,7 +15,7 @@ from drivers.errors import (
     DeviceUnreachable,
     StopFailed,
 )
-from drivers.targets import check_target
+from drivers.targets import check_ready, check_target
 from drivers.untried import warn_untried
 from drivers.ur.kinematics_info import KinematicsInfo, read_kinematics
 from drivers.ur.motion import MoveOrder
@@ -61,16 +61,10 @@ class URArm:
         self.kinematics: KinematicsInfo | None = None
 
     def connect(self) -> None:
-        """Open every link, check that the arm may be driven, and start the control script.
+        """Open every link and start the control script; see `drivers.arm.Arm`.
 
-        Raises
-        ------
-        DeviceUnreachable
-            No answer from one of the controller's ports.
-        DeviceRefused
-            Local mode, a program running, registers held by another client, PolyScope too old.
-        ArmStopped
-            Powered off, or stopped for safety.
+        Refused, too, in local mode, where another client holds the registers, and for a PolyScope
+        that is too old.
         """
         self.close()
         atexit.register(self.close)
@@ -84,10 +78,9 @@ class URArm:
             raise
 
     def state(self) -> ArmState:
-        """Return the newest packet, with the flange's pose freed of the tool offset.
+        """The newest packet, the flange's pose freed of the tool offset; see `drivers.arm.Arm`.
 
-        Raises `DeviceUnreachable` when it is stale. A link that was lost is tried again, so that a
-        reading can show whether the arm stands; the loss stays a fault until `connect`.
+        A link that was lost is tried again, so that a reading can show whether the arm stands.
         """
         packet = self._reader.newest()
         supervisor = self._connected()
@@ -115,13 +108,7 @@ class URArm:
         )
         packet = self._reader.newest()
         supervisor = self._connected()
-        fault = supervisor.why()
-        if fault is not None:
-            raise ArmStopped(self._named(fault))
-        if supervisor.busy or not at_rest(packet):
-            raise DeviceRefused(
-                self._named("still moving: wait until it is steady, or stop it first")
-            )
+        check_ready(supervisor.why(), supervisor.busy or not at_rest(packet), self._named)
         supervisor.order(self._order(target, packet))
 
     def stop(self) -> None:
@@ -154,7 +141,7 @@ class URArm:
         self._wait_ready(supervisor)
 
     def close(self) -> None:
-        """Stop and let go of the controller. Idempotent."""
+        """See `drivers.arm.Arm`."""
         atexit.unregister(self.close)
         if self._supervisor is not None:
             self._supervisor.close()

@@ -15,9 +15,10 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from sim.peers.abb import resources2
 from sim.peers.abb.answers import Answer, error
+from sim.peers.abb.arm_resources import Controller
 from sim.peers.abb.basic import BasicLogin
 from sim.peers.abb.digest import DigestLogin
-from sim.peers.abb.resources import Controller, Resources
+from sim.peers.abb.resources import Resources
 from sim.peers.abb.resources2 import Resources2
 from sim.peers.http import DroppableServer
 

@@ -12,15 +12,10 @@ from collections.abc import Callable
 from typing import Any
 from urllib.parse import parse_qs
 
-import numpy as np
-
-from drivers.abb.units import millimetres, scalar_first
 from sim.peers.abb.answers import DONE, Answer
+from sim.peers.abb.arm_resources import UNIT, ArmResources, Controller, Envelope
 from sim.peers.abb.panel import ABBFaults
-from sim.peers.abb.resources import Controller
 
-_UNUSED_AXIS = "9E+09"
-_UNIT = "rw/motionsystem/mechunits/ROB_1"
 _FILES, _SYMBOL, _MASTERSHIP = "fileservice/", "rw/rapid/symbol/RAPID/", "rw/mastership/"
 _WATCH = "T_CELL_WATCH/cell_watch/cell_watch_"
 _FORM, _HAL = "application/x-www-form-urlencoded;v=2.0", "application/hal+json;v=2.0"
@@ -57,6 +52,7 @@ class Resources2:
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
+        arm = self._arm = ArmResources(controller, Envelope(state, error, _NOT_ALLOWED))
         self._master: str | None = None
         self._gets: dict[str, Callable[[], Answer]] = {
             "rw/system": lambda: state({"_type": "sys-system", "rwversion": "7.21.0"}),
@@ -66,14 +62,14 @@ class Resources2:
             "rw/panel/opmode": lambda: state(
                 {"_type": "pnl-opmode", "opmode": controller.panel.mode}
             ),
-            "rw/rapid/execution": self._execution,
+            "rw/rapid/execution": arm.execution,
             "rw/elog/0": self._log,
-            f"{_UNIT}/jointtarget": self._jointtarget,
+            f"{UNIT}/jointtarget": arm.jointtarget,
             "logout": lambda: DONE,
         }
         self._posts: dict[str, Callable[[dict[str, str]], Answer]] = {
-            "rw/rapid/execution/start": lambda _: self._start(),
-            "rw/rapid/execution/stop": lambda _: self._stop(),
+            "rw/rapid/execution/start": lambda _: arm.start(),
+            "rw/rapid/execution/stop": lambda _: arm.stop(),
             "rw/panel/ctrl-state": self._set_state,
         }
         self._edits: dict[str, Callable[[dict[str, str]], Answer]] = {
@@ -103,8 +99,8 @@ class Resources2:
         return self._edit(path, values, client)
 
     def _get(self, path: str, query: dict[str, str]) -> Answer:
-        if path == f"{_UNIT}/robtarget":
-            return self._robtarget(query)
+        if path == f"{UNIT}/robtarget":
+            return self._arm.robtarget(query)
         if path.startswith(_SYMBOL):
             value = self._data(path)
             if value is not None:
@@ -148,55 +144,11 @@ class Resources2:
             self._controller.rapid_data[name] = value
         return DONE
 
-    def _execution(self) -> Answer:
-        running = "running" if self._controller.running else "stopped"
-        return state({"_type": "rap-execution", "ctrlexecstate": running, "cycle": "once"})
-
     def _log(self) -> Answer:
         return resources(*self._controller.log.entries())
 
-    def _jointtarget(self) -> Answer:
-        joints = np.degrees(self._controller.reported().joints_rad or ())
-        entry = {f"rax_{i}": f"{angle:.6f}" for i, angle in enumerate(joints, 1)}
-        entry |= {f"eax_{letter}": _UNUSED_AXIS for letter in "abcdef"}
-        return state({"_type": "ms-jointtarget", **entry})
-
-    def _robtarget(self, query: dict[str, str]) -> Answer:
-        pose = self._controller.reported().base_from_flange
-        if query.get("coordinate") != "Base":
-            pose = self._controller.world_from_base * pose
-        if query.get("tool") != "tool0":
-            pose = pose * self._controller.flange_from_active_tool
-        entry = dict(zip("xyz", (f"{v:.5f}" for v in millimetres(pose)), strict=True))
-        entry |= {f"q{i}": f"{v:.9f}" for i, v in enumerate(scalar_first(pose), 1)}
-        entry |= dict.fromkeys(("cf1", "cf4", "cf6", "cfx"), "0")
-        entry |= {f"eax{letter}": _UNUSED_AXIS for letter in "abcdef"}
-        return state({"_type": "ms-robtargets", **entry})
-
-    def _start(self) -> Answer:
-        controller = self._controller
-        controller.note("rws: start")
-        if controller.panel.mode != "AUTO" or controller.panel.controller != "motoron":
-            return _NOT_ALLOWED
-        if controller.running:
-            return error(403, -1073442812, "RAPID is executing")
-        controller.start()
-        return DONE
-
-    def _stop(self) -> Answer:
-        self._controller.note("rws: stop")
-        if self._controller.stop_orders.refused or self._controller.faults.rapid_stop_refused:
-            return _NOT_ALLOWED
-        self._controller.stop("rws stop")
-        return DONE
-
     def _set_state(self, values: dict[str, str]) -> Answer:
-        self._controller.note("rws: motors off")
-        if self._controller.stop_orders.refused or values.get("ctrl-state") != "motoroff":
-            return _NOT_ALLOWED
-        self._controller.panel.controller = "motoroff"
-        self._controller.stop("motors off")
-        return DONE
+        return self._arm.motors_off(understood=values.get("ctrl-state") == "motoroff")
 
     def _file(self, method: str, name: str, body: bytes) -> Answer:
         files = self._controller.files

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable
-from typing import Protocol
 
-from sim.peers.controller_faults import ControllerFaults, StopOrders
-from sim.peers.ur.modes import Robot, Runtime, Safety
+from sim.peers.ur.modes import Robot
+from sim.peers.ur.panel_controller import PanelController
 
 _UNLOCK_TOO_EARLY = (
     "Cannot unlock protective stop until 5s after occurrence. "
@@ -20,50 +19,10 @@ _LOCAL = "Not in remote control"
 _GOODBYE = "Disconnected"
 
 
-class Controller(Protocol):
-    """What this server reports of its controller, and what it orders."""
-
-    version: tuple[int, int, int, int]
-    remote_control: bool
-    robot_mode: Robot
-    safety: Safety
-    runtime: Runtime
-
-    @property
-    def faults(self) -> ControllerFaults:
-        """What goes wrong with it."""
-
-    @property
-    def stop_orders(self) -> StopOrders:
-        """How orders to stop are taken."""
-
-    def note(self, what: str) -> None:
-        """Remember that something arrived."""
-
-    def stop_program(self, why: str) -> None:
-        """End the program and its motion."""
-
-    @property
-    def model(self) -> str:
-        """The arm's model, as the controller names it."""
-
-    def play(self) -> bool:
-        """Resume a paused program; return whether there was one."""
-
-    def pause(self) -> bool:
-        """Pause the program that runs, and its motion; return whether there was one."""
-
-    def power(self, mode: Robot) -> None:
-        """Switch the arm's power and brakes."""
-
-    def unlock_protective_stop(self) -> bool:
-        """Release a protective stop; return whether it was time."""
-
-
 class DashboardServer:
     """Serves dashboard clients of one controller."""
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: PanelController) -> None:
         self._controller = controller
         self._questions: dict[str, Callable[[], str]] = {
             "polyscopeversion": self._polyscope,

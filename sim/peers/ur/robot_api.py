@@ -12,11 +12,12 @@ import threading
 import time
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler
-from typing import Any, Protocol
+from typing import Any
 
-from sim.peers.controller_faults import ControllerFaults, StopOrders
+from sim.peers.controller_faults import ControllerFaults
 from sim.peers.http import DroppableServer
-from sim.peers.ur.modes import Robot, Runtime, Safety
+from sim.peers.ur.modes import Robot, Safety
+from sim.peers.ur.panel_controller import PanelController
 
 BASE = "/universal-robots/robot-api"
 _POLL_S = 0.02
@@ -37,46 +38,6 @@ _LATER = "5.0.107"
 Reply = tuple[int, dict[str, Any]]
 
 
-class Controller(Protocol):
-    """What this server reports of its controller, and what it orders."""
-
-    version: tuple[int, int, int, int]
-    remote_control: bool
-    robot_mode: Robot
-    safety: Safety
-    runtime: Runtime
-
-    @property
-    def faults(self) -> ControllerFaults:
-        """What goes wrong with it."""
-
-    @property
-    def stop_orders(self) -> StopOrders:
-        """How orders to stop are taken."""
-
-    @property
-    def model(self) -> str:
-        """The arm's model, as the controller names it."""
-
-    def note(self, what: str) -> None:
-        """Remember that something arrived."""
-
-    def stop_program(self, why: str) -> None:
-        """End the program and its motion."""
-
-    def play(self) -> bool:
-        """Resume a paused program; return whether there was one."""
-
-    def pause(self) -> bool:
-        """Pause the program that runs, and its motion; return whether there was one."""
-
-    def power(self, mode: Robot) -> None:
-        """Switch the arm's power and brakes."""
-
-    def unlock_protective_stop(self) -> bool:
-        """Release a protective stop; return whether it was time."""
-
-
 class RobotApiServer:
     """Serves the robot API of one controller.
 
@@ -90,7 +51,9 @@ class RobotApiServer:
         Below 5.0 it knows neither versions nor model nor popups.
     """
 
-    def __init__(self, address: tuple[str, int], controller: Controller, api_version: str) -> None:
+    def __init__(
+        self, address: tuple[str, int], controller: PanelController, api_version: str
+    ) -> None:
         api = _Api(controller, api_version)
         handler = type("Handler", (_Handler,), {"api": api})
         self._server = DroppableServer(address, handler)
@@ -108,7 +71,7 @@ class RobotApiServer:
 
 
 class _Api:
-    def __init__(self, controller: Controller, api_version: str) -> None:
+    def __init__(self, controller: PanelController, api_version: str) -> None:
         self._controller = controller
         self._version = api_version
         answers: dict[str, Callable[[], dict[str, Any]]] = {

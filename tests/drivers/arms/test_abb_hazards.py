@@ -3,8 +3,6 @@
 import random
 import re
 import signal
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,9 +13,7 @@ from benches import (
     ABB_HOME,
     PATIENT_ABB,
     abb_peer,
-    best_of_three,
     free_udp_port,
-    halted_s,
     halts_short_of,
     quickly,
     slowly,
@@ -27,6 +23,7 @@ from benches import (
     until,
     wait_steady,
 )
+from hazards import halts_within, process_moving
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.chain.kinematics import arm as kinematics_of
@@ -68,17 +65,11 @@ def moving(egm=False, **settings):
 
 
 def test_a_stop_reaches_the_arm_within_100_ms_after_the_connections_were_dropped():
-    def measure():
-        with moving() as (arm, controller, sim):
-            controller.drop()
-            since_s = time.monotonic()
-            arm.stop()
-            latency_s = halted_s(controller, since_s)
-            assert halts_short_of(sim, FAR)
-            assert stays(sim, 0.2)
-            return latency_s
+    def stop(arm, controller):
+        controller.drop()
+        arm.stop()
 
-    best_of_three(measure, GOAL_S)
+    halts_within(GOAL_S, moving, stop, FAR)
 
 
 def test_dropped_connections_are_made_again_and_the_move_ends_at_its_target():
@@ -100,40 +91,24 @@ def test_a_stop_at_any_instant_of_a_start_leaves_the_arm_standing(seed):
         assert stays(sim)
 
 
-_MOVE_AND_WAIT = """
-import sys, time
-from drivers.arm import MoveTarget
+_CONNECT = """
 from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings
 arm = ABBArm(sys.argv[1], ABBSettings(login=FACTORY_LOGIN))
-arm.connect()
-arm.start_move(MoveTarget(joints_rad=tuple(map(float, sys.argv[2:])), joint_speed_rad_s=0.2,
-                          tcp_speed_m_s=0.5))
-print("moving", flush=True)
-time.sleep(60)
 """
 
 
 @contextmanager
-def process_moving():
-    with abb_peer() as (controller, sim):
-        command = [sys.executable, "-c", _MOVE_AND_WAIT, controller.url, *map(str, FAR)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
-            assert process.stdout.readline() == b"moving\n"
-            assert until(lambda: truly_moving(sim))
-            yield process, controller, sim
+def elsewhere():
+    """A process of its own moves the arm."""
+    with (
+        abb_peer() as (controller, sim),
+        process_moving(_CONNECT, controller.url, sim, FAR) as process,
+    ):
+        yield process, controller, sim
 
 
 def test_the_arm_stops_when_our_process_is_killed_on_the_way():
-    def measure():
-        with process_moving() as (process, controller, sim):
-            since_s = time.monotonic()
-            process.kill()
-            latency_s = halted_s(controller, since_s)
-            assert halts_short_of(sim, FAR)
-            assert stays(sim)
-            return latency_s
-
-    best_of_three(measure, GOAL_S)
+    halts_within(GOAL_S, elsewhere, lambda process, _: process.kill(), FAR)
 
 
 def test_a_controller_that_falls_silent_holds_nobody_up_and_is_reported():
@@ -181,17 +156,13 @@ def test_a_dead_controller_fails_the_stop_loudly_and_at_once():
 
 
 def test_a_cut_cable_stops_the_motion_under_way():
-    def measure():
-        with moving() as (_, controller, sim):
-            since_s = time.monotonic()
-            controller.cut()
-            latency_s = halted_s(controller, since_s)
-            assert halts_short_of(sim, FAR)
-            assert stays(sim)
-            controller.faults.mend_cable()
-            return latency_s
-
-    best_of_three(measure, LINK_WATCH_S + GOAL_S)
+    halts_within(
+        LINK_WATCH_S + GOAL_S,
+        moving,
+        lambda _, controller: controller.cut(),
+        FAR,
+        then=lambda _, controller: controller.faults.mend_cable(),
+    )
 
 
 def test_a_cut_cable_that_nobody_watches_stops_nothing():
@@ -203,17 +174,12 @@ def test_a_cut_cable_that_nobody_watches_stops_nothing():
 
 
 def test_the_arm_stops_when_our_process_hangs_on_the_way():
-    def measure():
-        with process_moving() as (process, controller, sim):
-            since_s = time.monotonic()
-            process.send_signal(signal.SIGSTOP)
-            latency_s = halted_s(controller, since_s)
-            process.kill()
-            assert halts_short_of(sim, FAR)
-            assert stays(sim)
-            return latency_s
-
-    best_of_three(measure, LINK_WATCH_S + GOAL_S)
+    halts_within(
+        LINK_WATCH_S + GOAL_S,
+        elsewhere,
+        lambda process, _: process.send_signal(signal.SIGSTOP),
+        FAR,
+    )
 
 
 def test_a_motion_that_the_controller_stopped_for_silence_is_reported_as_such():

@@ -9,9 +9,7 @@ from benches import (
     PATIENT_ABB,
     abb_peer,
     abb_settings,
-    best_of_three,
     free_udp_port,
-    halted_s,
     halts_short_of,
     slowly,
     stays,
@@ -19,6 +17,7 @@ from benches import (
     until,
     wait_steady,
 )
+from hazards import halts_within
 
 from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings, Login
 from drivers.abb.guard import session_for
@@ -66,16 +65,7 @@ def test_robotware_6_and_7_are_distinguished_by_the_login_they_ask_for():
 
 
 def test_a_stop_reaches_the_arm_within_100_ms():
-    def measure():
-        with moving() as (arm, controller, sim):
-            since_s = time.monotonic()
-            arm.stop()
-            latency_s = halted_s(controller, since_s)
-            assert halts_short_of(sim, FAR)
-            assert stays(sim)
-            return latency_s
-
-    best_of_three(measure, 0.1)
+    halts_within(0.1, moving, lambda arm, _: arm.stop(), FAR)
 
 
 def test_a_refused_stop_switches_the_motors_off():

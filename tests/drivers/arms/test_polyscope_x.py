@@ -8,20 +8,16 @@ import pytest
 from benches import (
     ROBOT_API_PORT,
     UR_FAR,
-    UR_HOME,
-    best_of_three,
-    halted_s,
     halts_short_of,
-    quickly,
     stays,
     until,
     ur_moving,
     ur_peer,
-    wait_steady,
 )
+from hazards import halts_within, recovers_by_the_five_second_rule
 
 from drivers.arm import Motion
-from drivers.errors import ArmStopped, DeviceRefused, DeviceUnreachable
+from drivers.errors import DeviceRefused, DeviceUnreachable
 from drivers.ur import URArm, URSettings
 from drivers.ur.dashboard_panel import DashboardPanel
 from drivers.ur.robot_api import RobotApi
@@ -69,18 +65,14 @@ def test_local_mode_is_refused_with_where_to_switch():
 
 
 def test_a_stop_reaches_the_arm_over_the_robot_api_alone():
-    def measure():
-        with moving() as (arm, controller, sim):
-            arm._supervisor._stops._by_script = lambda port: None
-            since_s = time.monotonic()
-            arm.stop()
-            latency_s = halted_s(controller, since_s)
-            assert [e for e in controller.events if e.what == "robot api: stop"]
-            assert halts_short_of(sim, UR_FAR)
-            assert stays(sim)
-            return latency_s
+    def stop(arm, controller):
+        arm._supervisor._stops._by_script = lambda port: None
+        arm.stop()
 
-    best_of_three(measure, 0.1)
+    def then(_, controller):
+        assert [e for e in controller.events if e.what == "robot api: stop"]
+
+    halts_within(0.1, moving, stop, UR_FAR, then=then)
 
 
 def test_a_stop_finds_its_way_after_the_connections_were_dropped():
@@ -102,18 +94,7 @@ def test_a_stop_that_is_refused_is_repeated_until_the_watchdog_stops_the_arm():
 
 def test_recovering_from_a_protective_stop_obeys_the_five_second_rule():
     with moving() as (arm, controller, sim):
-        controller.protective_stop()
-        assert until(lambda: arm.state().fault is not None)
-        with pytest.raises(ArmStopped, match="protective"):
-            arm.start_move(quickly(UR_HOME))
-        with pytest.raises(DeviceRefused, match="5s"):
-            arm.recover()
-        controller.wait_out_protective_stop()
-        arm.recover()
-        assert stays(sim)
-        assert arm.state().fault is None
-        arm.start_move(quickly(UR_HOME))
-        assert wait_steady(arm).joints_rad == pytest.approx(UR_HOME, abs=1e-6)
+        recovers_by_the_five_second_rule(arm, controller, sim)
 
 
 def test_a_switch_to_local_mode_stops_the_run():

@@ -8,11 +8,8 @@ that is too slow by design is too slow three times.
 import os
 import random
 import signal
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
-from subprocess import DEVNULL, PIPE
 
 import numpy as np
 import pytest
@@ -21,7 +18,6 @@ from benches import (
     UR_FAR,
     UR_HOME,
     best_of_three,
-    halted_s,
     halts_short_of,
     quickly,
     slowly,
@@ -33,9 +29,10 @@ from benches import (
     ur_peer,
     wait_steady,
 )
+from hazards import halts_within, process_moving, recovers_by_the_five_second_rule
 
 from drivers.arm import Motion
-from drivers.errors import ArmStopped, DeviceError, DeviceRefused, DeviceUnreachable, StopFailed
+from drivers.errors import ArmStopped, DeviceError, DeviceUnreachable, StopFailed
 from drivers.ur import URArm
 from sim.peers.ur import Runtime
 
@@ -69,18 +66,12 @@ def child_of(arm):
 
 @pytest.mark.parametrize("fault", [None, drop, mute, frozen_child, dead_child])
 def test_a_stop_request_reaches_the_arm_within_100_ms_whatever_ails_the_link(fault):
-    def measure():
-        with ur_moving() as (arm, controller, sim):
-            since_s = time.monotonic()
-            if fault is not None:
-                fault(controller, arm)
-            arm.stop()
-            latency_s = halted_s(controller, since_s)
-            assert halts_short_of(sim, UR_FAR)
-            assert stays(sim, 0.2)
-            return latency_s
+    def stop(arm, controller):
+        if fault is not None:
+            fault(controller, arm)
+        arm.stop()
 
-    best_of_three(measure, GOAL_S)
+    halts_within(GOAL_S, ur_moving, stop, UR_FAR)
 
 
 @pytest.mark.parametrize(
@@ -97,16 +88,7 @@ def test_a_stop_request_reaches_the_arm_within_100_ms_whatever_ails_the_link(fau
     ids=["drop", "dead child", "mute", "frozen child", "cut cable"],
 )
 def test_the_arm_is_stopped_even_if_nobody_asks(fault, goal_s):
-    def measure():
-        with ur_moving() as (arm, controller, sim):
-            since_s = time.monotonic()
-            fault(controller, arm)
-            latency_s = halted_s(controller, since_s)
-            assert halts_short_of(sim, UR_FAR)
-            assert stays(sim, 0.2)
-            return latency_s
-
-    best_of_three(measure, goal_s)
+    halts_within(goal_s, ur_moving, lambda arm, controller: fault(controller, arm), UR_FAR)
 
 
 def test_after_a_lost_link_old_poses_are_not_reported_as_new_ones():
@@ -237,19 +219,20 @@ def test_faults_at_random_instants_leave_the_arm_standing_and_are_reported(seed)
         assert stays(sim, 0.3)
 
 
-_MOVE_AND_WAIT = """
-import signal, sys, time
-from drivers.arm import MoveTarget
+_CONNECT = """
 from drivers.ur import URArm, URSettings
-# what a shell starts in the background inherits a deaf ear for Ctrl-C
-signal.signal(signal.SIGINT, signal.default_int_handler)
 arm = URArm(sys.argv[1], URSettings(heartbeat_s=0.5))
-arm.connect()
-arm.start_move(MoveTarget(joints_rad=tuple(map(float, sys.argv[2:])), joint_speed_rad_s=0.2,
-                          tcp_speed_m_s=0.5))
-print("moving", flush=True)
-time.sleep(60)
 """
+
+
+@contextmanager
+def elsewhere():
+    """A process of its own moves the arm."""
+    with (
+        ur_peer() as (controller, sim),
+        process_moving(_CONNECT, controller.address, sim, UR_FAR) as process,
+    ):
+        yield process, controller, sim
 
 
 @pytest.mark.parametrize(
@@ -262,21 +245,12 @@ time.sleep(60)
     ids=["interrupted", "killed", "frozen"],
 )
 def test_the_arm_stops_when_our_process_is_gone_on_the_way(ending, goal_s):
-    def measure():
-        with ur_peer() as (controller, sim):
-            command = [sys.executable, "-c", _MOVE_AND_WAIT, controller.address, *map(str, UR_FAR)]
-            with subprocess.Popen(command, stdout=PIPE, stderr=DEVNULL) as process:
-                assert process.stdout.readline() == b"moving\n"
-                assert until(lambda: truly_moving(sim))
-                since_s = time.monotonic()
-                process.send_signal(ending)
-                latency_s = halted_s(controller, since_s)
-                process.kill()
-            assert halts_short_of(sim, UR_FAR)
-            assert stays(sim)
-            return latency_s
-
-    best_of_three(measure, goal_s)
+    halts_within(
+        goal_s,
+        elsewhere,
+        lambda process, _: process.send_signal(ending),
+        UR_FAR,
+    )
 
 
 def test_a_protective_stop_ends_the_program_so_that_unlocking_does_not_drive_on():
@@ -308,16 +282,7 @@ def test_a_protective_stop_left_paused_would_have_driven_on():
 
 def test_recovering_from_a_protective_stop_obeys_the_five_second_rule():
     with ur_moving(**PATIENT_UR) as (arm, controller, sim):
-        controller.protective_stop()
-        assert until(lambda: arm.state().fault is not None)
-        with pytest.raises(DeviceRefused, match="5s"):
-            arm.recover()
-        controller.wait_out_protective_stop()
-        arm.recover()
-        assert stays(sim)
-        assert arm.state().fault is None
-        arm.start_move(quickly(UR_HOME))
-        assert wait_steady(arm).joints_rad == pytest.approx(UR_HOME, abs=1e-6)
+        recovers_by_the_five_second_rule(arm, controller, sim)
 
 
 def test_an_emergency_stop_is_reported_with_what_to_do():
