@@ -70,6 +70,12 @@ def _restore_arm(stand: Stand, _: Launch) -> None:
     stand.arm.restore()
 
 
+def _mend_cable(stand: Stand, launch: Launch) -> None:
+    stand.arm.faults.mend_cable()
+    time.sleep(1.0)  # what is still being ordered by the process that outlives the run
+    _restore_arm(stand, launch)
+
+
 def _revive_arm(stand: Stand, launch: Launch) -> None:
     time.sleep(1.0)  # what the run had still ordered comes to nothing
     stand.arm.kill()
@@ -345,7 +351,7 @@ _ABB = (
         exits=(SAFETY,),
         patterns=_NOBODY_KNOWS,
         halt_s=1.5,
-        restore=_restore_arm,
+        restore=_mend_cable,
     ),
     _CONTROLLER_DIES,
     Fault("connections dropped", lambda stand, _: stand.arm.drop(), survived=True),

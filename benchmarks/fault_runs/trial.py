@@ -19,6 +19,7 @@ from benchmarks.fault_runs.stands import Stand
 from calib.detection import Detection, detect
 from cell.storage.recording import Recording, read_recording
 from cell.storage.recording.frames import FILE_NAME as FRAMES
+from drivers.abb import FACTORY_LOGIN
 from sim.log import Row, views_of
 from sim.synthesize import true_corners
 
@@ -185,6 +186,9 @@ def _judge(fault: Fault, came: Trial) -> None:
 
 def _judge_recording(stand: Stand, folder: Path, before: list[bytes], came: Trial) -> None:
     came.demand(_lines(folder)[: len(before)] == before, "lines of the log were lost or changed")
+    secret = FACTORY_LOGIN.password.encode()
+    leaked = [file.name for file in folder.rglob("*.*") if secret in file.read_bytes()]
+    came.demand(not leaked, f"the controller's password stands in {leaked}")
     if not _lines(folder):
         return
     recording = read_recording(folder)

@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from typing import Literal
 
 from cell.errors import InputError
+from cell.sequencer.stop import FROM_TERMINAL
 from drivers.errors import DeviceUnreachable
 from sim.arm import SimArm
 from sim.build import build
@@ -88,7 +89,7 @@ def _serve(
 ) -> None:
     """In the peers' process: serve until the other end of `link` is gone."""
     # Ctrl-C and a closed terminal reach the whole group; the arm must live to be ordered to stop
-    for number in (signal.SIGINT, signal.SIGHUP):
+    for number in FROM_TERMINAL:
         signal.signal(number, signal.SIG_IGN)
     _compile(cell)
     with ExitStack() as stack:

@@ -7,7 +7,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+FROM_TERMINAL = {
+    signal.SIGINT: "Ctrl-C",
+    signal.SIGHUP: "SIGHUP",
+    signal.SIGQUIT: "Ctrl-\\",
+    signal.SIGTSTP: "Ctrl-Z",
+}
+"""What a terminal sends to every process of a command.
+
+A run that was suspended would leave nobody at the arm, and one that died at once nothing but the
+controller's own watch.
+"""
+_ASKED_BY = FROM_TERMINAL | {signal.SIGTERM: "SIGTERM"}
 
 
 class StopRequest:
@@ -38,12 +49,12 @@ class StopRequest:
 
 @contextmanager
 def signals_ask(stop: StopRequest) -> Iterator[None]:
-    """SIGINT, SIGTERM and SIGHUP set `stop` and do nothing else while this holds."""
+    """A terminal's signals and SIGTERM set `stop` and do nothing else while this holds."""
 
     def handle(number: int, frame: FrameType | None) -> None:
-        stop.ask("Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name)
+        stop.ask(_ASKED_BY[signal.Signals(number)])
 
-    before = {number: signal.signal(number, handle) for number in _SIGNALS}
+    before = {number: signal.signal(number, handle) for number in _ASKED_BY}
     try:
         yield
     finally:

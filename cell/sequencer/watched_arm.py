@@ -113,19 +113,20 @@ class WatchedArm:
         if self._newest is None or state.host_t_s > self._newest.host_t_s:
             self._previous, self._newest = self._newest, state
 
-    def _least_way_rad(self, *, undisturbed: bool) -> float:
-        """How far the arm must have gone since the newest reading; below 0 where it may not have.
-
-        `undisturbed`: nothing but the order that follows can have stopped it.
-        """
+    def _least_way_rad(self, fault: BaseException | None) -> float:
+        """How far it must have gone since the newest reading; below 0 where it may not have."""
         newest, goal = self._newest, self._goal_rad
         if newest is None or newest.joints_rad is None or goal is None:
             return -1.0
+        if isinstance(fault, ArmStopped) and newest.joint_velocity_rad_s is None:
+            return -1.0  # it stopped by itself, maybe before that reading, which tells no speed
         speed_rad_s = self._speed_rad_s(newest)
         left_rad = float(np.abs(np.subtract(newest.joints_rad, goal)).max())
         if not (speed_rad_s > _UNDERWAY_RAD_S and left_rad > ARRIVING_RAD):
             return -1.0
         age_s = self.clock.now() - newest.host_t_s
+        # nothing but the operator's order can have stopped it
+        undisturbed = isinstance(fault, StoppedByOperator)
         return _SURE_SHARE * speed_rad_s * max(age_s, 0.0) if undisturbed else 0.0
 
     def _speed_rad_s(self, newest: ArmState) -> float:
@@ -209,13 +210,10 @@ class WatchedArm:
                 )
             self.clock.sleep(POLL_S)
 
-    def halt(self, *, undisturbed: bool = False) -> StopReport:
-        """Stop the arm; returns what readings say of it afterwards.
-
-        `undisturbed`: nothing can have stopped it before.
-        """
+    def halt(self, because: BaseException | None = None) -> StopReport:
+        """Stop the arm; returns what readings say of it afterwards."""
         stop = ConfirmedStop(self.arm, self.clock, self.on_reading)
-        least_way_rad = self._least_way_rad(undisturbed=undisturbed)
+        least_way_rad = self._least_way_rad(because)
         word = stop.see_through(self._newest, least_way_rad=least_way_rad)
         self._goal_rad = None
         return word
@@ -230,7 +228,7 @@ class WatchedArm:
         """
         if not self.connected:
             return fault, None
-        word = self.halt(undisturbed=isinstance(fault, StoppedByOperator))
+        word = self.halt(fault)
         if word.stands:
             return fault, word
         because = "the run was over" if fault is None else str(fault) or type(fault).__name__

@@ -15,7 +15,7 @@ from typing import Any
 
 _TRIES = 3
 _NO_CONTENT, _REFUSED = 204, 300
-STOP, MOTORS_OFF = "stop", "motors off"
+STOP, MOTORS_OFF, READY = "stop", "motors off", "ready"
 _RAPID_STOP, _MOTORS_OFF = {"stopmode": "stop"}, {"ctrl-state": "motoroff"}
 _ORDERS = {
     1: (
@@ -113,8 +113,14 @@ class StopSession:
 
     def log_in(self) -> None:
         """Make the first request, which costs the challenge; raises `OSError`."""
-        # read, so that the connection stands open for the stop and no handshake is in its way
-        self._ask("GET", f"{self._url}/rw/rapid/execution?json=1", read=True)
+        for left in reversed(range(_TRIES)):
+            try:
+                # read, so that the connection stands open for the stop, no handshake in its way
+                self._ask("GET", f"{self._url}/rw/rapid/execution?json=1", read=True)
+                return
+            except OSError:
+                if not left:
+                    raise
 
     def stop(self, *, motors_off: bool = False) -> str | None:
         """Stop RAPID, or else the motors; return None, or why neither could be done.
@@ -173,8 +179,12 @@ def main() -> None:
     """Log in, say so, and stop the arm on every line and at the end."""
     options: dict[str, Any] = json.loads(sys.stdin.readline())
     session = StopSession(**options)
-    session.log_in()
-    print("ready", flush=True)
+    try:
+        session.log_in()
+    except OSError as error:
+        print(type(error).__name__, flush=True)
+        return
+    print(READY, flush=True)
     for line in sys.stdin:
         session.stop(motors_off=line.strip() == MOTORS_OFF)
     session.stop()

@@ -14,7 +14,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from drivers.abb.guard import MOTORS_OFF, STOP, StopSession
+from drivers.abb.guard import MOTORS_OFF, READY, STOP, StopSession
 from drivers.abb.rws import login_in
 from drivers.abb.settings import ABBSettings
 from drivers.errors import DeviceUnreachable
@@ -106,13 +106,14 @@ class Stopper:
         assert guard.stdout is not None
         late = threading.Timer(_GUARD_START_S, guard.kill)
         late.start()
-        greeting = guard.stdout.readline()
+        greeting = guard.stdout.readline().strip()
         late.cancel()
-        if greeting.strip() != "ready":
+        if greeting != READY:
             self._end_guard(guard)
+            why = greeting or f"no word from it within {_GUARD_START_S:g} s"
             raise DeviceUnreachable(
                 f"ABB arm {self._url}: the process that is to stop the arm should this one die "
-                "could not log in. Nothing moves without it"
+                f"could not log in ({printable(why)}). Nothing moves without it; try again"
             )
 
     def _order_guard(self, line: str) -> None:

@@ -102,6 +102,38 @@ def test_half_turned_frames_of_a_symmetric_board_are_turned_back(tmp_path: Path)
     assert np.array_equal(same_order_everywhere(plain).corners_px, corners)
 
 
+def test_a_square_board_of_even_sides_has_one_order_in_every_frame() -> None:
+    from dataclasses import replace
+
+    import cv2
+
+    from calib.views import Board
+
+    views = mixed_scene(noise_px=0.0).views
+    known = views.corners_px.reshape(len(views), 7, 10, 2)
+    board = Board("chessboard", rows=14, cols=14, square_m=0.02)
+    ends = np.array([[0, 0], [13, 0], [13, 13], [0, 13]], np.float32)
+    grid = np.stack(np.meshgrid(np.arange(14.0), np.arange(14.0)), -1).reshape(1, -1, 2)
+    corners = np.array(
+        [
+            cv2.perspectiveTransform(
+                grid,
+                cv2.getPerspectiveTransform(
+                    ends, np.array([k[0, 0], k[0, -1], k[-1, -1], k[-1, 0]], np.float32)
+                ),
+            )[0]
+            for k in known
+        ]
+    )
+    turned = corners.copy()
+    turned[[2, 9]] = turned[[2, 9], ::-1]
+    # as a file's reader may lay them out in memory
+    strided = np.ascontiguousarray(turned.swapaxes(0, 2)).swapaxes(0, 2)
+    sigma = np.zeros(corners.shape[:2])
+    plain = replace(views, board=board, corners_px=strided, corner_sigma_px=sigma)
+    assert np.array_equal(same_order_everywhere(plain).corners_px, corners)
+
+
 def test_corners_far_off_stand_in_the_file_and_in_the_report(tmp_path: Path) -> None:
     from dataclasses import replace
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import cell
 from cell.sequencer.confirmed_stop import DEADLINE_S, ConfirmedStop, StopReport
 from cell.sequencer.rest import REST_S
 from drivers.arm import ArmState, MoveTarget
@@ -164,6 +167,16 @@ def test_an_arm_at_rest_is_confirmed_though_the_order_was_not_taken(clock: FastC
     arm.stop_error = StopFailed("link closed")
     word = ConfirmedStop(arm, clock).see_through(arm.state())
     assert word.stands
+
+
+def test_every_verb_that_moves_or_stops_an_arm_does_so_through_the_confirmed_stop() -> None:
+    room = Path(cell.__file__).parent
+    orders = {
+        path.relative_to(room).as_posix()
+        for path in room.rglob("*.py")
+        if re.search(r"\.start_move\(|arm\.stop\(\)", path.read_text())
+    }
+    assert orders == {"sequencer/watched_arm.py", "sequencer/confirmed_stop.py"}
 
 
 def test_readings_from_before_the_order_count_for_nothing(clock: FastClock) -> None:

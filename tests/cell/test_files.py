@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import jsonschema
@@ -69,6 +71,19 @@ def test_missing_files(tmp_path: Path) -> None:
     (tmp_path / "bench.yaml").unlink()
     with pytest.raises(InputError, match=r"plan.yaml: cell: .*bench.yaml is not there"):
         read_plan(plan)
+
+
+def test_a_process_killed_while_it_writes_leaves_what_was_there(tmp_path: Path) -> None:
+    report = tmp_path / "report.html"
+    report.write_text("of yesterday")
+    script = (
+        "import os, sys; from pathlib import Path; from cell.storage.atomic import atomic_file\n"
+        "with atomic_file(Path(sys.argv[1])) as file:\n"
+        "    file.write('x' * 100_000); file.flush(); os.kill(os.getpid(), 9)\n"
+    )
+    died = subprocess.run([sys.executable, "-c", script, str(report)], check=False)
+    assert died.returncode == -9
+    assert report.read_text() == "of yesterday"
 
 
 def test_key_given_twice_is_refused(tmp_path: Path) -> None:

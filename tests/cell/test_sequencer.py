@@ -6,6 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -259,6 +260,43 @@ def test_a_failing_stop_is_the_loudest_error(
     assert bench.arm.calls.count("stop") > 10
 
 
+def test_an_arm_that_had_stopped_by_itself_by_its_newest_reading_is_known_to_stand(
+    bench: Bench,
+) -> None:
+    """Of a controller that tells no speeds: what came next is what it was, and yet not old."""
+    state = bench.arm.state
+
+    def without_speeds() -> ArmState:
+        reading = state()
+        if bench.arm.moving and bench.arm.share > 0.3:
+            bench.arm.brakes_s = bench.clock.now()  # a guard was opened
+            reading = state()
+        stopped = "guard stop" if np.isfinite(bench.arm.brakes_s) else None
+        return replace(reading, joint_velocity_rad_s=None, fault=stopped)
+
+    bench.arm.state = without_speeds  # type: ignore[method-assign]
+    result = bench.run()
+    assert result.finish is Finish.DEVICE_FAILED, result.reason
+    assert "guard stop" in result.reason
+
+
+def test_a_run_that_took_every_view_is_not_done_while_the_arm_is_not_known_to_stand(
+    bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def drive_on(status: Status) -> None:
+        if status.done == status.total and "frame 3 logged" in (status.event or ""):
+            bench.arm.start_move(MoveTarget(tuple(HOME + 0.4), joint_speed_rad_s=0.05))
+            bench.arm.obeys_after_s = np.inf
+
+    watcher = Watcher()
+    watcher.status_changed = drive_on  # type: ignore[method-assign]
+    bench.watchers = [watcher]
+    result = bench.run()
+    assert (result.finish.exit_status, result.frames) == (EXIT_SAFETY, 4)
+    assert "THE ARM DOES NOT STOP" in capsys.readouterr().err
+    assert "the run was over" in result.reason
+
+
 @pytest.mark.parametrize("obeys", [True, False])
 def test_an_arm_that_moves_again_after_a_confirmed_stop_is_stopped_again_and_that_is_told(
     obeys: bool, bench: Bench, capsys: pytest.CaptureFixture[str]
@@ -396,8 +434,16 @@ def test_an_arm_that_stops_by_itself_ends_the_run(bench: Bench) -> None:
     assert "protective stop" in result.reason
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_stops_a_moving_arm_within_100_ms(real_bench: Bench, number: int) -> None:
+NAMED = {signal.SIGINT: "Ctrl-C", signal.SIGQUIT: "Ctrl-\\", signal.SIGTSTP: "Ctrl-Z"}
+
+
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP],
+)
+def test_a_signal_stops_a_moving_arm_within_100_ms(
+    real_bench: Bench, number: signal.Signals
+) -> None:
     sent: list[float] = []
 
     def send() -> None:
@@ -413,7 +459,7 @@ def test_a_signal_stops_a_moving_arm_within_100_ms(real_bench: Bench, number: in
     assert result.finish.exit_status == EXIT_OPERATOR
     assert real_bench.arm.stopped_s is not None
     assert real_bench.arm.stopped_s - sent[0] < 0.1
-    assert ("Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name) in result.reason
+    assert result.reason == f"stopped by {NAMED.get(number, signal.Signals(number).name)}"
 
 
 def test_the_operator_is_heard_while_the_camera_hangs(real_bench: Bench) -> None:

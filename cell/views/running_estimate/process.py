@@ -16,6 +16,7 @@ from types import TracebackType
 
 from calib.views import FloatArray
 from cell.errors import InputError
+from cell.sequencer.stop import FROM_TERMINAL
 from cell.sequencer.watcher import Checked, Watcher
 from cell.storage.files.plan_file import Plan
 from cell.storage.recording import FrameRecord, read_recording
@@ -143,7 +144,7 @@ class RunningEstimate(Watcher):
 def _serve(link: Connection, plan: Plan, planned_poses: FloatArray, recorded: Path | None) -> None:
     """In the process: estimate whenever there is something new, until the other end is gone."""
     # Ctrl-C and a closed terminal reach the whole group; the run decides when this ends
-    for number in (signal.SIGINT, signal.SIGHUP):
+    for number in FROM_TERMINAL:
         signal.signal(number, signal.SIG_IGN)
     os.nice(_LESS_URGENT)
     estimator = Estimator(plan, planned_poses)

@@ -96,7 +96,7 @@ def test_a_stop_is_confirmed_where_readings_are_true_and_never_where_they_are_no
 ) -> None:
     for fault, value in kind.faults.items():
         setattr(stand.arm.faults, fault, value)
-    word = arm.halt(undisturbed=True)
+    word = arm.halt(StoppedByOperator("stopped by the test"))
     if word.stands:
         assert not stand.truly_moving()
     else:
