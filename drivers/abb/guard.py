@@ -2,12 +2,14 @@
 
 An IRC5 has no watchdog on Robot Web Services: a motion program goes on to its end, whoever sent
 it. The process holds a session of its own. Every line on its standard input, and the end of it,
-makes it stop RAPID and, should the controller refuse or the line say so, switch the motors off. It
-is run by path and stands alone.
+makes it stop RAPID and, should the controller refuse or the line say so, switch the motors off. One
+line is no order: it names the session of the cell, whose mastership is given back at the end, as a
+cell that died cannot do, and no other run could begin. It is run by path and stands alone.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import ssl
 import sys
@@ -16,6 +18,8 @@ from typing import Any
 _TRIES = 3
 _NO_CONTENT, _REFUSED = 204, 300
 STOP, MOTORS_OFF, READY = "stop", "motors off", "ready"
+SESSION = "session "
+_RELEASE = "rw/mastership/edit/release"
 _RAPID_STOP, _MOTORS_OFF = {"stopmode": "stop"}, {"ctrl-state": "motoroff"}
 _ORDERS = {
     1: (
@@ -135,6 +139,15 @@ class StopSession:
             why = refusal or ""
         return why or None
 
+    def give_back(self, cookie: str) -> None:
+        """Release, as far as that can be done, what the session with this cookie is master of."""
+        with contextlib.suppress(OSError):
+            self._session.cookies.clear()
+            self._session.cookies.update(
+                dict(part.split("=", 1) for part in cookie.split("; ") if "=" in part)
+            )
+            self._ask("POST", f"{self._url}/{_RELEASE}", {})
+
     def _post(self, path: str, payload: dict[str, str]) -> str | None:
         why = ""
         for _ in range(_TRIES):
@@ -185,9 +198,15 @@ def main() -> None:
         print(type(error).__name__, flush=True)
         return
     print(READY, flush=True)
+    cookie = ""
     for line in sys.stdin:
-        session.stop(motors_off=line.strip() == MOTORS_OFF)
+        if line.startswith(SESSION):
+            cookie = line.removeprefix(SESSION).strip()
+        else:
+            session.stop(motors_off=line.strip() == MOTORS_OFF)
     session.stop()
+    if cookie:
+        session.give_back(cookie)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,10 @@ from drivers.errors import DeviceError, DeviceRefused
 from drivers.outside import printable
 
 _LONGEST_S = 5.0  # of one answer, however slowly it comes
+_REMEDIES = {
+    -1073445857: ". End the other program (RobotStudio, another run); from one whose link was lost"
+    " an operator takes mastership away by turning to manual mode and back to automatic"
+}
 BeforeRequest = Callable[[str, str], None]
 
 
@@ -114,6 +118,6 @@ def _refusal(url: str, error: Exception) -> DeviceError:
     if code == -1 or "401" in str(error):
         return DeviceRefused(f"ABB arm {url}: user name or password is wrong")
     if code is not None:
-        text = printable(str(error))
-        return DeviceRefused(f"ABB arm {url}: the controller refuses: {text} (code {code})")
+        text = f"{printable(str(error))} (code {code}){_REMEDIES.get(code, '')}"
+        return DeviceRefused(f"ABB arm {url}: the controller refuses: {text}")
     return DeviceError(f"ABB arm {url}: {printable(str(error)) or type(error).__name__}")

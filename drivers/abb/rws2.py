@@ -58,6 +58,11 @@ class Rws2:
         session.auth = (login.user, login.password)
         self._edits = False
 
+    @property
+    def cookie(self) -> str:
+        """What names the session to the controller."""
+        return "; ".join(f"{cookie.name}={cookie.value}" for cookie in self._session.cookies)
+
     # ---- panel and execution -----------------------------------------------------------------
 
     def get_operation_mode(self) -> str:

@@ -14,9 +14,10 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from drivers.abb.guard import MOTORS_OFF, READY, STOP, StopSession
+from drivers.abb.guard import MOTORS_OFF, READY, SESSION, STOP, StopSession
 from drivers.abb.rws import login_in
 from drivers.abb.settings import ABBSettings
+from drivers.abb.transport import silent
 from drivers.errors import DeviceUnreachable
 from drivers.outside import printable
 
@@ -60,7 +61,7 @@ class Stopper:
         try:
             self._session.log_in()
         except OSError as error:
-            raise DeviceUnreachable(f"ABB arm {self._url}: {printable(str(error))}") from None
+            raise silent(self._url, error) from None
         self._guard = subprocess.Popen(
             [sys.executable, "-P", str(_GUARD)],
             stdin=subprocess.PIPE,
@@ -73,6 +74,10 @@ class Stopper:
         self._order_guard(self._login)
         self._await_guard(self._guard)
         self._thread.start()
+
+    def gives_back(self, cookie: str) -> None:
+        """What the session with this cookie is master of is released should this process die."""
+        self._order_guard(f"{SESSION}{cookie}")
 
     def order(self, *, motors_off: bool = False) -> bool:
         """Send the stop on both ways; return whether the answer came at once, see `failure`.

@@ -105,6 +105,8 @@ class Supervisor:
         with named(self._url):
             self._watch.reset()
         self._stopper.open()
+        if isinstance(self._rws, Rws2):
+            self._stopper.gives_back(self._rws.cookie)
         self._poll()
         self._poll()
         self._thread.start()

@@ -1,5 +1,6 @@
 """What is particular to an OmniCore: Robot Web Services 2.0."""
 
+import contextlib
 import time
 from contextlib import contextmanager
 
@@ -17,7 +18,7 @@ from benches import (
     until,
     wait_steady,
 )
-from hazards import halts_within
+from hazards import halts_within, process_moving
 
 from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings, Login
 from drivers.abb.guard import session_for
@@ -29,6 +30,13 @@ from sim.peers.abb.answers import Answer
 from sim.peers.controller_faults import Stops
 
 FAR = tuple(angle + 0.6 for angle in ABB_HOME)
+
+
+_CONNECT = """
+import sys
+from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings
+arm = ABBArm(sys.argv[1], ABBSettings(login=FACTORY_LOGIN, certificate_sha256="{trusted}"))
+"""
 
 
 @contextmanager
@@ -66,6 +74,24 @@ def test_robotware_6_and_7_are_distinguished_by_the_login_they_ask_for():
 
 def test_a_stop_reaches_the_arm_within_100_ms():
     halts_within(0.1, moving, lambda arm, _: arm.stop(), FAR)
+
+
+def test_a_run_that_is_killed_leaves_the_mastership_to_the_next_one():
+    with abb_peer(omnicore=True) as (controller, sim):
+        trusted = certificate_of(controller.address, controller.port)
+        connect = _CONNECT.format(trusted=trusted)
+        with process_moving(connect, controller.url, sim, FAR) as process:
+            process.kill()
+        rws = Rws2(controller.url, session_for(trusted), FACTORY_LOGIN)
+
+        def is_master():
+            with contextlib.suppress(Rws2Refused):
+                rws.resetpp()
+                return True
+            return False
+
+        assert until(is_master)
+        rws.close()
 
 
 def test_a_refused_stop_switches_the_motors_off():
