@@ -170,9 +170,16 @@ def _repaired(repair: _Log, *, renumbered: bool) -> LogRepair:
 
 def _calibrated(repair: _Log) -> Baseline:
     """The pictures' calibration, as if a change of the camera midway had not been."""
-    baseline = fit_baseline(repair.views, usable_frames(repair.views))
-    changed = find_picture_step(repair.views, baseline)
+    baseline: Baseline | CalibrationError
+    try:
+        baseline = fit_baseline(repair.views, usable_frames(repair.views))
+    except CalibrationError as error:
+        baseline = error
+    found = baseline if isinstance(baseline, Baseline) else None
+    changed = find_picture_step(repair.views, found)
     if changed is None:
+        if isinstance(baseline, CalibrationError):
+            raise baseline
         return baseline
     repair.known = (changed.step,)
     alike = as_before(repair.views, changed)

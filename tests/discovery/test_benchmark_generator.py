@@ -91,3 +91,10 @@ def test_every_fault_is_found_in_the_log(fault):
     names = [m.name for m in found.mixups] + [p.effect.name for p in found.known]
     assert names
     assert set(names) <= set(fault.names)
+
+
+def test_pictures_of_two_scales_that_no_one_camera_shows_are_told_as_a_step():
+    case = conceal("fault 12: binning midway", (), "binning midway")
+    rows = np.arange(len(case.ahead))
+    found = repair_log(views_of(case, rows[~case.ahead]), views_of(case, rows))
+    assert [p.effect.name for p in found.known] == ["optics_step"]

@@ -12,6 +12,7 @@ from calib.chain import rigid
 from calib.chain.kinematics import arm
 from calib.discovery.log_consistency.mixup import Mixup
 from calib.discovery.log_repair import LogRepair, repair_log
+from calib.discovery.rejections import lost_frames
 from calib.views import FloatArray, Views
 from cell.devices.log_mixups import _scalar_first, mix_up
 from cell.storage.files.cell_file import EffectFile
@@ -157,6 +158,17 @@ def test_a_pose_that_froze_is_reported_and_its_frames_are_left_out():
     assert only(found).parameters["from_frame"][0] == CLEAN.frame[12]
     assert only(found).parameters["to_frame"][0] == CLEAN.frame[19]
     np.testing.assert_array_equal(found.views.frame, np.delete(CLEAN.frame, range(12, 20)))
+
+
+def test_a_run_of_poses_that_fit_nothing_is_left_out_where_sound_frames_follow():
+    rng = np.random.default_rng(3)
+    poses = CLEAN.base_from_flange.copy()
+    away = np.concatenate([rng.normal(0, 0.03, (5, 3)), rng.normal(0, 0.05, (5, 3))], axis=1)
+    poses[12:17] = poses[12:17] @ rigid.from_vector(away)
+    unknown = np.full_like(CLEAN.joints_rad, np.nan)
+    found = log_repair_of(replace(CLEAN, base_from_flange=poses, joints_rad=unknown))
+    assert [r.frame for r in found.rejected] == [int(f) for f in CLEAN.frame[12:17]]
+    assert lost_frames(found.rejected, CLEAN.frame) is not None
 
 
 @pytest.mark.parametrize("at", [9, 21])

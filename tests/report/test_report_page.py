@@ -180,9 +180,11 @@ def test_what_is_unexplained_warns_in_the_first_sentence(tmp_path: Path) -> None
     data = replace(data, diagnosis=reported)
     _, text = parsed(data, tmp_path)
     assert "With care" in text
-    assert "The mounted pose follows gravity x, upright" in text
+    assert "mounted on the flange moves in proportion to gravity x, upright" in text
     assert "Look at what holds the camera" in text
-    assert "0.31 px worse without it" in text
+    assert "the bracket's screws" in text
+    assert "0.31 px worse without" in text
+    assert "0.0002804 to 0.0003196" in text
     assert "step: mounted_pose along order (3.0 behind)" in text
 
 

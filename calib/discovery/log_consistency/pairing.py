@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 from calib.discovery.log_consistency.mispairing import mispaired
 from calib.discovery.log_consistency.mixup import Mixup
 from calib.discovery.log_consistency.odd_frames import OddFrames
-from calib.views import FloatArray, Views
+from calib.views import BoolArray, FloatArray, Views
 
 _MOST_ODD_SHARE = 0.1
+
+_MOST_RUN_SHARE = 0.3
+_SOUND = 3
 
 _SURE = 4.0
 """Two odd frames that fit each other's poses best vouch for one another, and so does a pose that
@@ -56,7 +59,8 @@ def find_pairing(views: Views, log: Views, loop: FloatArray, found: OddFrames | 
     lost = [int(i) for i in np.flatnonzero(odd & (source < 0))]
     alone = [i for i in lost if not _beside(lost, i)]
     few = len(alone) <= max(1, _MOST_ODD_SHARE * len(views))
-    dropped = tuple(int(views.frame[i]) for i in alone) if few else ()
+    left_out = sorted([*(alone if few else []), *_passing(lost, odd)])
+    dropped = tuple(int(views.frame[i]) for i in left_out)
     reported = {
         int(views.frame[i]): int(log.frame[source[i]]) for i in np.flatnonzero(odd & (source >= 0))
     }
@@ -66,8 +70,25 @@ def find_pairing(views: Views, log: Views, loop: FloatArray, found: OddFrames | 
 
 
 def _beside(lost: list[int], i: int) -> bool:
-    """A run of odd frames is no mix-up of single rows: something moved and stayed there."""
+    """A run of odd frames is no mix-up of single rows."""
     return i - 1 in lost or i + 1 in lost
+
+
+def _passing(lost: list[int], odd: BoolArray) -> list[int]:
+    """Runs of odd frames with sound ones on both sides: what moved there did not stay there."""
+    runs: list[list[int]] = []
+    for i in lost:
+        if runs and runs[-1][-1] == i - 1:
+            runs[-1].append(i)
+        elif _beside(lost, i):
+            runs.append([i])
+    longest = _MOST_RUN_SHARE * len(odd)
+    return [i for run in runs if len(run) <= longest and _sound_around(run, odd) for i in run]
+
+
+def _sound_around(run: list[int], odd: BoolArray) -> bool:
+    before, after = odd[: run[0]][-_SOUND:], odd[run[-1] + 1 :][:_SOUND]
+    return bool(min(len(before), len(after)) == _SOUND and not before.any() and not after.any())
 
 
 def _sources(views: Views, log: Views, loop: FloatArray, found: OddFrames) -> NDArray[np.int64]:

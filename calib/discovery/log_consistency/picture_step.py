@@ -41,17 +41,18 @@ class PictureStep:
     principal_point_px: FloatArray
 
 
-def find_picture_step(views: Views, baseline: Baseline) -> PictureStep | None:
+def find_picture_step(views: Views, baseline: Baseline | None) -> PictureStep | None:
     """The step of the optics that two calibrations show, or None where one will do.
 
     Parameters
     ----------
     views, baseline:
-        The recording's frames, and the calibration of all of them.
+        The recording's frames, and the calibration of all of them; None where no one camera shows
+        them.
     """
     floor = _homographies_mean_square(views)
     single = _costs(views, baseline, floor)
-    left_out = 1.0 - baseline.used.mean()
+    left_out = 1.0 if baseline is None else 1.0 - baseline.used.mean()
     if single.mean() < _SUSPECT**2 * floor and left_out < _LEFT_OUT_SHARE:
         return None
     inner = range(_FEWEST, len(views) - _FEWEST + 1)
@@ -92,9 +93,11 @@ def _homographies_mean_square(views: Views) -> float:
     return float(np.median(squares))
 
 
-def _costs(views: Views, baseline: Baseline, floor: float) -> FloatArray:
+def _costs(views: Views, baseline: Baseline | None, floor: float) -> FloatArray:
     """(N,) mean square of each frame under its camera; the cap for one that was left out."""
     out = np.full(len(views), _CAP * floor)
+    if baseline is None:
+        return out
     known = np.asarray(baseline.used)
     square = np.nanmean(baseline.mle.residual_px[known] ** 2, axis=(1, 2))
     out[known] = np.minimum(np.nan_to_num(square, nan=np.inf), _CAP * floor)
@@ -114,12 +117,8 @@ def _calibrated(views: Views) -> Baseline | None:
 
 
 def _split_cost(views: Views, at: int, floor: float) -> float:
-    total = 0.0
-    for half in _halves(views, at):
-        found = _calibrated(half)
-        total += (
-            _CAP * floor * len(half) if found is None else float(_costs(half, found, floor).sum())
-        )
+    halves = _halves(views, at)
+    total = sum(float(_costs(half, _calibrated(half), floor).sum()) for half in halves)
     return total / len(views)
 
 

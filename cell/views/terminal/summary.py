@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cell.views.answer_text import answer_text
+from cell.views.unnamed import look_at, sentence
 
 _NAMES = {
     "zhang_algebraic": "Zhang, algebraic",
@@ -71,6 +72,11 @@ def diagnosis_summary(diagnosis: Mapping[str, Any]) -> str:
             " (poses tied to the robot)"
         )
     lines += [f"- {effect['name']}: {effect['physics']}" for effect in diagnosis["effects"]]
+    for left in diagnosis.get("unexplained_all") or ():
+        lines.append(f"- without a name: {sentence(left)}")
+        if left.get("law"):
+            lines.append(f"  {left['law']['equation']}")
+        lines.append(f"  {look_at(left)}")
     return "\n".join(lines)
 
 

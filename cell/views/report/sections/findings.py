@@ -21,6 +21,7 @@ from cell.views.report.evidence import law, picture_of, remedy_of
 from cell.views.report.figures import proof
 from cell.views.report.sections.answer import verdict_text
 from cell.views.report.sections.drawing import drawing
+from cell.views.unnamed import look_at, sentence
 
 
 def diagnosis_section(data: ReportData) -> str:
@@ -133,25 +134,45 @@ def _unexplained(data: ReportData) -> str:
     return f"<h3>What nobody can name</h3>{reported}"
 
 
-_LOOK_AT = {
-    "arm": "the arm: base bolts, joints, gears, cables and hoses that pull",
-    "mount": "what holds the camera (or the board) on the flange",
-    "board": "the board and what it stands on",
-    "lens": "the lens and its focus, and the camera's settings",
-    "sensor": "the camera: its settings, its housing, its sensor",
-}
-
-
 def _without_a_name(data: ReportData, left: Mapping[str, Any]) -> str:
-    """A sentence, what to look at on the machine, the law with its numbers, and its picture."""
-    place = f", {left['where']}" if left.get("where") else ""
-    site, along = (str(left[key]).replace("_", " ") for key in ("site", "covariate"))
-    message = (
-        f"The {site} follows {along}{place} "
-        f"(p {probability(left.get('p_value'))}), and no known effect accounts for it. "
-        f"Look at {_LOOK_AT.get(left['link'], left['link'])}, and at what changes with {along}."
+    """A sentence, the law with its numbers, what to look at on the machine, and a picture."""
+    found = left.get("law") or {}
+    gain = found.get("holdout_gain_px")
+    rows = [
+        ("What it does", sentence(left)),
+        ("Its equation", found.get("equation") or ""),
+        ("How large", parameters(found.get("parameters") or {})),
+        ("How sure", f"p {probability(left.get('p_value'))}"),
+        (
+            "What it costs",
+            "" if gain is None else f"held-out frames are {gain:.2f} px worse without",
+        ),
+        ("What to look at", look_at(left)),
+        ("Other laws that fit", "; ".join(found.get("rivals") or [])),
+    ]
+    facts = html.table(("question", "answer"), [row for row in rows if row[1]])
+    title = f"{left['link']}: {str(left['site']).replace('_', ' ')}"
+    return (
+        f'<article class="effect"><h3>{html.text(title)}</h3><div class="facts">{facts}</div>'
+        f"{_interval_table(found)}{_law_picture(data, left)}</article>"
     )
-    return html.paragraph(message, "bad-note") + _law(left.get("law")) + _law_picture(data, left)
+
+
+def _interval_table(found: Mapping[str, Any]) -> str:
+    """Every number of a law with the interval that holds it in 19 of 20 runs."""
+    rows = [
+        (name.replace("_", " "), f"{v['value']:.4g}", _interval(v["value"], v["sigma"]), v["unit"])
+        for name, v in (found.get("parameters") or {}).items()
+    ]
+    if not rows:
+        return ""
+    return html.table(("number", "value", "95 % interval", "unit"), rows)
+
+
+def _interval(value: float, sigma: float) -> str:
+    if not sigma:
+        return "as found, not estimated"
+    return f"{value - 1.96 * sigma:.4g} to {value + 1.96 * sigma:.4g}"
 
 
 def _law_picture(data: ReportData, left: Mapping[str, Any]) -> str:
@@ -164,21 +185,6 @@ def _law_picture(data: ReportData, left: Mapping[str, Any]) -> str:
         return ""
     shown = link.draw(data, {"name": "", "link": left["link"]})
     return "" if shown is None else html.figure(shown.svg(link.look_for), link.look_for)
-
-
-def _law(found: Mapping[str, Any] | None) -> str:
-    if not found:
-        return ""
-    gain = found.get("holdout_gain_px")
-    worth = "" if gain is None else f" Held-out frames are {gain:.2f} px worse without it."
-    rivals = found.get("rivals") or []
-    others = "" if not rivals else f" Not ruled out: {'; '.join(rivals)}."
-    rows = [
-        (name.replace("_", " "), f"{v['value']:.4g}", f"{v['sigma']:.2g}", v["unit"])
-        for name, v in found["parameters"].items()
-    ]
-    table = html.table(("number", "value", "one sigma", "unit"), rows)
-    return html.paragraph(f"Law ({found['form']}): {found['equation']}.{worth}{others}") + table
 
 
 def _rivals(diagnosis: Mapping[str, Any]) -> str:
