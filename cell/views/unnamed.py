@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from calib.chain.covariates import COVARIATES, DERIVED
+
 _PLACES = {
     "arm": "the arm: base bolts, joints, gears, cables and hoses that pull",
     "mount": "what holds the camera (or the board) on the flange",
@@ -64,9 +66,10 @@ def sentence(left: Mapping[str, Any]) -> str:
         return f"{str(left['where']).capitalize()}."
     law = left.get("law") or {}
     along = law.get("covariates") or [left["covariate"]]
-    words = " and ".join(str(name).replace("_", " ") for name in along)
+    words = " and ".join(_in_words(str(name)) for name in along)
     does = _DOES.get(str(law.get("form")), "follows {}").format(words)
-    place = f", {left['where']}" if left.get("where") else ""
+    where = left.get("where")
+    place = "" if where in (None, "", "all of it") else f", {where}"
     return f"The {_site(str(left['site']))} {does}{place}; no known effect accounts for it."
 
 
@@ -81,6 +84,12 @@ def look_at(left: Mapping[str, Any]) -> str:
     causes = [words for name in along for at, words in _CAUSES if re.search(at, str(name))][:1]
     causes = causes or [f"what changes with {str(left['covariate']).replace('_', ' ')}"]
     return f"Look at {_PLACES.get(left['link'], left['link'])}; and at {causes[0]}."
+
+
+def _in_words(covariate: str) -> str:
+    """A known covariate in words; a key of the log as it stands there."""
+    known = {each.name for each in (*COVARIATES, *DERIVED)}
+    return covariate.replace("_", " ") if covariate in known else covariate
 
 
 def _site(name: str) -> str:

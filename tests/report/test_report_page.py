@@ -14,6 +14,7 @@ from calib.views import Views
 from cell.storage.files.calibration_file import CalibrationFile
 from cell.storage.files.diagnosis_file import DiagnosisFile
 from cell.views.report import ReportData, write_report
+from cell.views.terminal.summary import diagnosis_summary
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 
@@ -198,3 +199,19 @@ def test_a_long_recording_makes_a_page_one_can_mail(tmp_path: Path) -> None:
     data = made_up_cell.full(60)
     write_report(tmp_path / "report.html", data)
     assert (tmp_path / "report.html").stat().st_size < 5e6
+
+
+def test_the_terminal_says_what_has_no_name_and_where_to_look() -> None:
+    law = {"form": "linear", "equation": "principal_point.u_px = +0.6 (gain_db - 3) [px]",
+           "covariates": ["gain_db"], "parameters": {}, "rivals": []}  # fmt: skip
+    left = {"link": "lens", "site": "principal_point", "covariate": "gain_db", "p_value": 1e-9,
+            "where": "all of it", "law": law}  # fmt: skip
+    lost = {"link": "bookkeeping", "site": "frames", "covariate": "order", "p_value": 1e-9,
+            "where": "5 frames between 3 and 7 contradict the others", "law": None}  # fmt: skip
+    reported = made_up_cell.diagnosis(verdict="unexplained", unexplained_all=[left, lost])
+    lines = diagnosis_summary(reported)
+    assert "principal point) moves in proportion to gain_db; no known effect" in lines
+    assert "+0.6 (gain_db - 3) [px]" in lines
+    assert "automatic gain and exposure" in lines
+    assert "5 frames between 3 and 7" in lines
+    assert "Look at these frames' pictures" in lines
