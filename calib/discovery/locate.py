@@ -7,29 +7,24 @@ for periods, and the image and the board for a field of shifts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chain.covariates import CONSTANT, COVARIATES, Covariate
+from calib.chain.covariates import COVARIATES, Covariate
 from calib.chain.effect import Link, Present
-from calib.chain.empirical import (
-    Curve,
-    Site,
-    present_curve,
-    site_columns,
-    span,
-)
+from calib.chain.empirical import Curve, Site, site_columns, span, wave
 from calib.chain.model import evaluate
 from calib.chain.state import ChainState
 from calib.discovery.fields import BOARD_HEIGHT, IMAGE_FIELD, field_scores
-from calib.discovery.score import Score, conditional, extended, group_score
-from calib.solver.joint import JointFit, assemble, frame_errors
-from calib.solver.unknowns import amounts, prior_information
+from calib.discovery.laws.frames import frame_blocks, inverse_root
+from calib.discovery.score import Score, group_score
+from calib.solver.joint import JointFit, frame_errors
 from calib.views import FloatArray, Views
 
 _PERIODS = 240
 _LEAST_SPREAD = 1e-9
+_RIDGE = 1e-7
 
 
 @dataclass(frozen=True)
@@ -92,42 +87,63 @@ def locate(fit: JointFit, views: Views, *, periods: bool = True) -> list[Cell]:
     return sorted(cells, key=lambda cell: (cell.p_value, -cell.score.gain))
 
 
+@dataclass(frozen=True)
+class _Part:
+    """What the frames say of a site: (N, D, D) information, (N, D, R) cross terms, (N, D) score.
+
+    The cross terms are those with the fitted numbers, by the root of these numbers' covariance.
+    """
+
+    own: FloatArray
+    cross: FloatArray
+    gradient: FloatArray
+
+
 class _Probe:
     """One linearisation of every site, multiplied by whatever a covariate asks for."""
 
     def __init__(self, fit: JointFit, views: Views, state: ChainState) -> None:
-        self.fit, self.views, self.state = fit, views, state
+        self.views, self.state = views, state
         # the base's pose along any covariate spans what the board's does: the same test twice
         self.sites = tuple(s for s in site_columns(views) if s.name != "base_pose")
-        presents = [present_curve(Curve(s, CONSTANT, 0.0, 1.0), state) for s in self.sites]
-        _, self.found, unknowns, self.base = extended(fit, views, presents)
-        self.amount = amounts(fit.model, fit.unknowns)
-        self.information = prior_information(fit.unknowns)
-        first = len(fit.model.effects)
-        self.owner = np.array([u.place[1] - first for u in unknowns[self.base :]])
+        blocks = frame_blocks(fit, views)
+        t = blocks.shared
+        information, gradient = blocks.base()
+        root = inverse_root(information)
+        self.at = root.T @ gradient
+        self.parts: list[_Part] = []
+        for site in self.sites:
+            mine = [t + k for k, c in enumerate(blocks.components) if c.site.name == site.name]
+            own = blocks.information[:, mine][:, :, mine]
+            cross = np.einsum("nts,tr->nsr", blocks.information[:, :t, mine], root, optimize=True)
+            self.parts.append(_Part(own, cross, blocks.gradient[:, mine]))
 
-    def _test(self, functions: FloatArray) -> list[Score]:
-        """Scores of every site following the (N, B) functions."""
-        columns = self.found.local[:, :, self.base :]
-        n, q, e = columns.shape
-        product = (columns[:, :, None, :] * functions[:, None, :, None]).reshape(n, q, -1)
-        local = np.concatenate([self.found.local[:, :, : self.base], product], axis=2)
-        found = replace(self.found, local=local)
-        shift = self.fit.equations.corner_shift if self.fit.equations.corner_numbers else None
-        free = np.zeros(local.shape[2] - self.base)
-        information = np.pad(self.information, (0, len(free)))
-        prior = (np.append(self.amount, free), information)
-        equations, _ = assemble(
-            found, self.views, self.fit.weight, self.fit.own_error, shift, prior
-        )
-        b = functions.shape[1]
-        information, score = conditional(equations, self.fit, self.base + np.arange(b * e))
-        owner = np.tile(self.owner, b)
-        scores = []
-        for index in range(len(self.sites)):
-            mine = np.flatnonzero(owner == index)
-            scores.append(group_score(information[np.ix_(mine, mine)], score[mine], self.views))
-        return scores
+    def _asked(self, functions: FloatArray, part: _Part) -> tuple[FloatArray, FloatArray]:
+        """(G, E, E) information and (G, E) score of a site following G sets of (G, N, B)."""
+        g, _, b = functions.shape
+        columns = b * part.own.shape[1]
+        through = np.einsum("gnb,nsr->gbsr", functions, part.cross, optimize=True)
+        through = through.reshape(g, columns, -1)
+        pairs = functions[:, :, :, None] * functions[:, :, None, :]
+        information = np.einsum("gnbc,nsu->gbscu", pairs, part.own, optimize=True)
+        information = information.reshape(g, columns, columns)
+        information -= through @ np.swapaxes(through, 1, 2)
+        score = np.einsum("gnb,ns->gbs", functions, part.gradient, optimize=True)
+        return information, score.reshape(g, columns) - through @ self.at
+
+    def _score(self, functions: FloatArray, part: _Part) -> Score:
+        """Score of a site following the (N, B) functions; its step in units of usual sizes."""
+        information, score = self._asked(functions[None], part)
+        return group_score(information[0], score[0], self.views)
+
+    def _gains(self, functions: FloatArray, part: _Part) -> FloatArray:
+        """(G,) about what each of the sets of functions would gain."""
+        information, score = self._asked(functions, part)
+        unit = 1.0 / np.sqrt(np.maximum(np.einsum("gee->ge", information), 1e-300))
+        normal = information * unit[:, :, None] * unit[:, None, :] + _RIDGE * np.eye(unit.shape[1])
+        along = score * unit
+        solved = np.linalg.solve(normal, along[:, :, None])[:, :, 0]
+        return np.asarray(np.sum(along * solved, axis=1))
 
     def along(self, covariate: Covariate) -> list[Cell]:
         """Every site along one covariate; none where it does not vary."""
@@ -137,11 +153,12 @@ class _Probe:
             return []
         curves = [Curve(site, covariate, low, high) for site in self.sites]
         functions = curves[0].functions(self.state)
+        scores = [self._score(functions, part) for part in self.parts]
         return [
             Cell(
                 s.name, s.link, covariate.name, score, 1, curve, _where(curve, score, self.state, s)
             )
-            for s, curve, score in zip(self.sites, curves, self._test(functions), strict=True)
+            for s, curve, score in zip(self.sites, curves, scores, strict=True)
         ]
 
     def periods(self) -> list[Cell]:
@@ -154,19 +171,15 @@ class _Probe:
         step = float(np.median(np.diff(np.sort(value[np.isfinite(value)]))))
         shortest, longest = max(0.5 * step, 0.2), 0.5 * (high - low)
         frequency = np.linspace(1.0 / longest, 1.0 / shortest, _PERIODS)
-        best: dict[str, tuple[Curve, Score]] = {}
-        for f in frequency:
-            curves = [Curve(s, time, low, high, 1.0 / float(f)) for s in self.sites]
-            for curve, score in zip(
-                curves, self._test(curves[0].functions(self.state)), strict=True
-            ):
-                name = curve.site.name
-                if name not in best or score.p_value < best[name][1].p_value:
-                    best[name] = (curve, score)
-        return [
-            Cell(c.site.name, c.site.link, "time", s, _PERIODS, c, f"period {c.period:.3g} s")
-            for c, s in best.values()
-        ]
+        swings = np.stack([wave(value, 1.0 / float(f)) for f in frequency])
+        cells = []
+        for site, part in zip(self.sites, self.parts, strict=True):
+            best = int(np.argmax(self._gains(swings, part)))
+            curve = Curve(site, time, low, high, 1.0 / float(frequency[best]))
+            score = self._score(swings[best], part)
+            where = f"period {curve.period:.3g} s"
+            cells.append(Cell(site.name, site.link, "time", score, _PERIODS, curve, where))
+        return cells
 
 
 def _where(curve: Curve, score: Score, state: ChainState, site: Site) -> str:
@@ -178,8 +191,7 @@ def _where(curve: Curve, score: Score, state: ChainState, site: Site) -> str:
     if len(score.step) != functions.shape[1] * len(site.components):
         return "everywhere"
     amount = functions @ score.step.reshape(functions.shape[1], -1)
-    typical = np.array([t for _, _, t in site.components])
-    size = np.linalg.norm((amount - np.median(amount, axis=0)) / typical, axis=1)
+    size = np.linalg.norm(amount - np.median(amount, axis=0), axis=1)
     high = value[np.isfinite(value) & (size >= 0.5 * size.max())]
     if len(high) == 0:
         return "everywhere"

@@ -203,10 +203,21 @@ class Search:
             trials.append((candidate, self._trial(tried, candidate)))
         return sorted(trials, key=lambda pair: pair[1].criterion)
 
+    def _contest(self, fit: JointFit) -> list[tuple[Candidate, Trial]]:
+        """Fit the most promising, without those that cannot come near the best of them."""
+        trials: list[tuple[Candidate, Trial]] = []
+        reached = 0.0
+        for candidate, score in self.ranked(fit)[:_FITTED_IN_EARNEST]:
+            promise = self._promise(candidate, score)
+            if promise <= 0.0 or _SCORE_FALLS_SHORT * promise < reached - UNDECIDED:
+                break
+            trials += self.earnest(fit, [candidate])
+            reached = max(reached, self.best.criterion - trials[-1][1].criterion)
+        return sorted(trials, key=lambda pair: pair[1].criterion)
+
     def _take(self) -> bool:
         fit = self.best.fit
-        promising = [c for c, s in self.ranked(fit) if self._promise(c, s) > 0.0]
-        trials = self.earnest(fit, promising[:_FITTED_IN_EARNEST])
+        trials = self._contest(fit)
         present = {p.effect.label for p in fit.model.effects}
         for at, (candidate, trial) in enumerate(trials):
             demand = self.best.criterion - trial.criterion
