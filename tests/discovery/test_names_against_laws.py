@@ -8,10 +8,11 @@ import numpy as np
 
 from benchmarks.discovery.recordings import conceal
 from benchmarks.discovery.run import views_of
+from calib.chain.effect import Present
 from calib.chain.effects import make_effect
 from calib.chain.laws.arm_field import coordinates, present_field, rms
 from calib.chain.model import predict
-from calib.discovery.laws.arm_field import find_arm_field, scatters_too_much
+from calib.discovery.laws.arm_field import find_arm_field, scatters_too_much, with_arm_field
 from calib.discovery.laws.cross_validation import CrossValidation
 from calib.discovery.laws.frames import frame_blocks
 from calib.discovery.laws.review import drop_unsupported, replaced_by_laws
@@ -84,13 +85,13 @@ def test_an_amount_at_the_end_of_its_range_makes_no_name():
     assert within_bounds(replace(fit, model=fit.model.with_effects([thin])), "protective_window")
 
 
-def smooth_arm() -> Views:
+def smooth_arm(*others: Present) -> Views:
     """An arm that errs smoothly over its joints by some tenths of a millimetre."""
     nodes = coordinates(LOG, "joints")
     weights = np.random.default_rng(18).normal(0.0, 1.0, (len(nodes), 6))
     weights *= np.array([2e-4] * 3 + [4e-4] * 3)
     field = present_field("joints", nodes, weights, 1.2, 1.0)
-    return record(plain_cell().with_effects([field]), LOG, 19)
+    return record(plain_cell().with_effects([*others, field]), LOG, 19)
 
 
 def test_an_arm_that_errs_smoothly_over_its_joints_is_reported_and_a_sound_one_is_not():
@@ -103,6 +104,17 @@ def test_an_arm_that_errs_smoothly_over_its_joints_is_reported_and_a_sound_one_i
     assert 0.0 < given["length_scale_sigma"] < given["length_scale"]
     assert 0.0 < given["share_sigma"] < 0.5
     assert 0.0 < given["rms_sigma_m"] < 0.3 * rms(found.present)[0]
+
+
+def test_names_that_soak_up_a_smooth_arm_give_way_to_its_field_and_a_true_one_stays():
+    slip = make_effect("board_slip", {"at_frame": 16})
+    search = searched(smooth_arm(), slip, make_effect("joint_compliance", {}))
+    (cell,) = with_arm_field(search)
+    assert (cell.site, cell.covariate) == ("flange_pose", "joints")
+    assert names(search) == ["empirical"]
+    search = searched(smooth_arm(BREATHING), BREATHING, slip)
+    assert len(with_arm_field(search)) == 1
+    assert names(search) == ["focus_breathing", "empirical"]
 
 
 def test_an_arm_that_scatters_much_without_a_pattern_makes_no_field():
