@@ -85,6 +85,7 @@ def find_residual_structure(
     search.drop_beside_curves()
     drop_beside_kinematics(search)
     drop_unsupported(search, beside_field=any(cell.is_field for cell in found))
+    search.drop_undemanded({cell.law.effect.label for cell in found if cell.law is not None})
     found += with_arm_field(search)
     present = {p.effect.label for p in search.best.fit.model.effects}
     kept = [cell for cell in found if cell.law is None or cell.law.effect.label in present]

@@ -431,6 +431,23 @@ class Search:
         without = self.fitter.with_effects(self.best.fit, rest)
         return self._trial(without).criterion - self.best.criterion, without
 
+    def drop_undemanded(self, labels: set[str]) -> None:
+        """Drop those laws that would not be taken now.
+
+        They were demanded beside others that are gone: a law that took the place of a name, which
+        had stood beside a second one.
+        """
+        for label in labels:
+            present = next(
+                (p for p in self.best.fit.model.effects if p.effect.label == label), None
+            )
+            if present is None:
+                continue
+            missed, without = self.missed(present)
+            if missed < DEMAND:
+                self._settle(without)
+                self.steps = [s for s in self.steps if s.taken.effect.label != label]
+
     def _drop(self) -> bool:
         """Drop the effect that the others have made needless, if there is one."""
         fit = self.best.fit

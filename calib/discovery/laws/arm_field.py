@@ -39,6 +39,10 @@ _REPEATABLE_M, _REPEATABLE_RAD = 2e-4, 5e-4
 _WORTH_BEYOND = 4.0
 """The same where the arm scatters more than any does: that something is there need not be shown."""
 
+_SEEN = 0.3
+"""What the corners' noise does to a frame's pose, as a share of the arm's scatter: corners of one
+picture that err alike do three times as much, and where that is the scatter it is not the arm's."""
+
 _NUMBERS = 3
 """Of a field: its size, length scale and share."""
 
@@ -81,6 +85,12 @@ class _Scatter:
         self.information -= np.einsum("nft,nfs->ts", cross, back)
         self.gradient = normals.pull + scale * normals.gradient.sum(axis=0)
         self.gradient -= np.einsum("nft,nf->t", back, pulled)
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether the pictures tell the frames' errors well enough for these to be the arm's."""
+        sigma = np.sqrt(np.einsum("nii->ni", self.noise))
+        return float(np.median(sigma)) < _SEEN
 
     def thinned(self) -> _Scatter:
         """Every so many of the frames; what the pictures say of the shared numbers stays."""
@@ -152,7 +162,8 @@ def find_arm_field(fit: JointFit, views: Views) -> ArmField | None:
         for rest in [(length, share, size)]
     ]
     reached, length, share, size = min(tries)
-    if reached > free - (_WORTH_BEYOND if scatters_too_much(fit) else _WORTH):
+    certain = scatters_too_much(fit) and whole.is_seen
+    if reached > free - (_WORTH_BEYOND if certain else _WORTH):
         return None
     loss = np.array([one[0] for one in tries])
     sigmas = (
