@@ -14,6 +14,7 @@ from calib.discovery.laws.surface_field import SurfaceField, demanded_field, put
 from calib.discovery.locate import Cell, locate
 from calib.discovery.search import Search
 from calib.discovery.spread import stands_out
+from calib.distributions import chi2_tail
 from calib.views import Views
 
 ALARM = 2e-3
@@ -85,11 +86,29 @@ def find_residual_structure(
     search.drop_beside_curves()
     drop_beside_kinematics(search)
     drop_unsupported(search, beside_field=any(cell.is_field for cell in found))
-    search.drop_undemanded({cell.law.effect.label for cell in found if cell.law is not None})
+    found = _as_they_stand(search, found)
     found += with_arm_field(search)
     present = {p.effect.label for p in search.best.fit.model.effects}
     kept = [cell for cell in found if cell.law is None or cell.law.effect.label in present]
     return ResidualStructure(search, known + tuple(kept))
+
+
+def _as_they_stand(search: Search, found: Sequence[Cell]) -> list[Cell]:
+    """The cells with what their laws gain now; a law that would not be taken now is dropped.
+
+    A law that took the place of a name was judged beside others.
+    """
+    labels = {cell.law.effect.label for cell in found if cell.law is not None and cell.law.free}
+    gains = search.drop_undemanded(labels)
+    judged = []
+    for cell in found:
+        label = "" if cell.law is None else cell.law.effect.label
+        if label in gains:
+            gain = gains[label]
+            score = replace(cell.score, gain=gain, p_value=chi2_tail(gain, cell.score.columns))
+            cell = replace(cell, score=score)
+        judged.append(cell)
+    return judged
 
 
 def _carried(search: Search) -> list[Cell]:

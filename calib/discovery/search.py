@@ -431,22 +431,22 @@ class Search:
         without = self.fitter.with_effects(self.best.fit, rest)
         return self._trial(without).criterion - self.best.criterion, without
 
-    def drop_undemanded(self, labels: set[str]) -> None:
-        """Drop those laws that would not be taken now.
+    def drop_undemanded(self, labels: set[str]) -> dict[str, float]:
+        """Drop those laws that would not be taken now; what the others gain in -2 log likelihood.
 
         They were demanded beside others that are gone: a law that took the place of a name, which
         had stood beside a second one.
         """
-        for label in labels:
-            present = next(
-                (p for p in self.best.fit.model.effects if p.effect.label == label), None
-            )
-            if present is None:
+        gains: dict[str, float] = {}
+        for present in self.best.fit.model.effects:
+            if present.effect.label not in labels:
                 continue
             missed, without = self.missed(present)
             if missed < DEMAND:
                 self._settle(without)
-                self.steps = [s for s in self.steps if s.taken.effect.label != label]
+            else:
+                gains[present.effect.label] = without.minus_two_log - self.best.fit.minus_two_log
+        return gains
 
     def _drop(self) -> bool:
         """Drop the effect that the others have made needless, if there is one."""

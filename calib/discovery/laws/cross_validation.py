@@ -22,6 +22,9 @@ _BLOCK_FRAMES = 2
 _BEYOND_CHANCE = 1.64
 """One-sided 5 %: so many standard errors above zero is a gain in frames that had no say."""
 
+_BEYOND_SELECTION = 2.33
+"""One-sided 1 %: of a hundred thousand laws the best is the one that chance favours."""
+
 
 @dataclass(frozen=True)
 class Worth:
@@ -46,6 +49,11 @@ class Worth:
     def supported(self) -> bool:
         """Whether the left-out frames want the effect, beyond chance."""
         return self.minus_two_log > _BEYOND_CHANCE * self.sigma
+
+    @property
+    def supports_a_law(self) -> bool:
+        """The same of a law, which was picked among very many for these very frames."""
+        return self.minus_two_log > _BEYOND_SELECTION * self.sigma
 
 
 def folds(frames: int) -> NDArray[np.int64]:

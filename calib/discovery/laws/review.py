@@ -148,7 +148,8 @@ def drop_unsupported(search: Search, *, beside_field: bool = False) -> None:
         effects = [fit.model.effects[k] for k in fitted]
         worth = [checked.without(k) for k in fitted]
         wanted = [
-            w.supported and not (beside_field and _in_camera(p) and w.gain_px <= 0.0)
+            (w.supports_a_law if p.effect.name == UNNAMED else w.supported)
+            and not (beside_field and _in_camera(p) and w.gain_px <= 0.0)
             for w, p in zip(worth, effects, strict=True)
         ]
         if all(wanted):
