@@ -11,7 +11,7 @@ from typing import Any
 
 from cell.errors import InputError
 from cell.storage.files.plan_file import Plan
-from cell.storage.incoming import plain_file, read_bytes
+from cell.storage.incoming import inside, plain_file, read_bytes
 from cell.storage.incoming.limits import LOG_BYTES
 from cell.storage.recording.disk import disk_errors, write_synced
 from cell.storage.recording.file_watch import gone
@@ -29,7 +29,7 @@ class Journal:
     """
 
     def __init__(self, folder: Path) -> None:
-        path = folder / FILE_NAME
+        path = inside(folder, FILE_NAME, f"{folder}")
         torn = plain_file(path) and not read_bytes(path, LOG_BYTES).endswith(b"\n")
         self._path = path
         self._file = path.open("ab", buffering=0)

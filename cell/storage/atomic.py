@@ -40,7 +40,8 @@ def atomic_file(
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         try:
-            with partial.open("w", encoding="utf-8", newline=newline) as file:
+            partial.unlink(missing_ok=True)  # of a process that died; or a link, never followed
+            with partial.open("x", encoding="utf-8", newline=newline) as file:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())

@@ -20,10 +20,11 @@ _FAILED = "motion program failed"
 
 def fault_in(rws: Any) -> str | None:
     """Ask for panel states; return what keeps the arm from moving and what to do, or None."""
+    # in this order: a key that is turned changes the state, too, maybe between the two questions
+    state = rws.get_controller_state()
     mode = rws.get_operation_mode()
     if mode != "AUTO":
         return f"the controller is in mode {mode}: turn the key to automatic and confirm it"
-    state = rws.get_controller_state()
     if state == "motoron":
         return None
     return _CONTROLLER_STATES.get(state, f"the controller is in state {state}")

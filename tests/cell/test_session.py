@@ -121,6 +121,29 @@ def test_a_recording_is_not_begun_twice(tmp_path: Path) -> None:
         record_plan(plan, tmp_path / "run", devices())
 
 
+@pytest.mark.parametrize("name", ["frames.jsonl", "journal.jsonl"])
+@pytest.mark.parametrize("there", [False, True])
+@pytest.mark.parametrize("resume", [False, True])
+def test_nothing_is_appended_to_a_file_elsewhere(
+    tmp_path: Path, name: str, there: bool, resume: bool
+) -> None:
+    plan, folder, victim = make_plan(tmp_path), tmp_path / "run", tmp_path / "victim"
+    if resume:
+        record_plan(plan, folder, devices())
+        (folder / name).rename(victim)
+        if not there:
+            victim.unlink()
+    else:
+        folder.mkdir()
+        if there:
+            victim.write_text("of somebody else")
+    (folder / name).symlink_to(victim)
+    before = victim.read_bytes() if there else None
+    with pytest.raises(InputError, match=r"leads out of|of a run to resume"):
+        record_plan(plan, folder, devices(), resume=resume)
+    assert (victim.read_bytes() if victim.exists() else None) == before
+
+
 def test_two_runs_do_not_write_one_recording(tmp_path: Path) -> None:
     plan = make_plan(tmp_path)
     record_plan(plan, tmp_path / "run", devices())

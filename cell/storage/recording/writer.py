@@ -44,8 +44,9 @@ class RecordingWriter:
         self.folder = folder
         self.header = header
         self._images = pictures_folder(folder, header)
-        self._lines = (folder / frame_file.FILE_NAME).open("ab", buffering=0)
-        self._kept = FileWatch(self._lines, folder / frame_file.FILE_NAME, self._images)
+        lines = inside(folder, frame_file.FILE_NAME, f"{folder}")
+        self._lines = lines.open("ab", buffering=0)
+        self._kept = FileWatch(self._lines, lines, self._images)
 
     @classmethod
     def create(cls, folder: Path, header: Header) -> RecordingWriter:
@@ -55,7 +56,7 @@ class RecordingWriter:
             images = pictures_folder(folder, header)
             if images is not None:
                 images.mkdir(parents=True, exist_ok=True)
-            if (folder / frame_file.FILE_NAME).exists():
+            if inside(folder, frame_file.FILE_NAME, f"{folder}").exists():
                 raise FileExistsError
             write_header(folder, header)
         except FileExistsError:
@@ -82,7 +83,7 @@ class RecordingWriter:
             A file of it is broken or leads elsewhere, or a line's picture is missing.
         """
         header = header_file.read_header(folder)
-        lines = folder / frame_file.FILE_NAME
+        lines = inside(folder, frame_file.FILE_NAME, f"{folder}")
         images = pictures_folder(folder, header)
         frames: tuple[FrameRecord, ...] = ()
         try:

@@ -30,6 +30,7 @@ from calib.chain.kinematics import arm as kinematics_of
 from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings, Login, link_watch
 from drivers.abb.program import build_program
 from drivers.abb.readings import Reading
+from drivers.abb.status import fault_in
 from drivers.arm import Motion, MoveTarget
 from drivers.errors import ArmStopped, DeviceError, DeviceRefused, DeviceUnreachable, StopFailed
 from sim.peers.abb.motion_program import decode
@@ -109,6 +110,23 @@ def elsewhere():
 
 def test_the_arm_stops_when_our_process_is_killed_on_the_way():
     halts_within(GOAL_S, elsewhere, lambda process, _: process.kill(), FAR)
+
+
+def test_a_key_turned_between_two_questions_is_reported_as_such():
+    class Panel:
+        mode, state = "AUTO", "motoron"
+
+        def turns(self, answer):
+            self.mode, self.state = "MANR", "guardstop"
+            return answer
+
+        def get_operation_mode(self):
+            return self.turns(self.mode)
+
+        def get_controller_state(self):
+            return self.turns(self.state)
+
+    assert "turn the key to automatic" in fault_in(Panel())
 
 
 def test_a_controller_that_falls_silent_holds_nobody_up_and_is_reported():
