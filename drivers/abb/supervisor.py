@@ -259,7 +259,8 @@ class Supervisor:
             if panel is not None:
                 return panel
             failure = self._watch.stopped() or failure_in_log(self._rws)
-        return f"the motion ended {off} from its target ({failure or 'no reason logged'})"
+        why = failure or "no reason logged; look who or what stopped it, or moved it there"
+        return f"the motion ended {off} from its target ({why})"
 
     def _explained(self, error: DeviceError) -> str:
         """What the panel says, which may be why something was refused, or else the error."""
