@@ -1,10 +1,11 @@
 """The tests, several times, while every core is kept busy besides.
 
-    python -m benchmarks.suite_under_load [--times 3] [--busy 2] [-- PYTEST'S WORDS]
+    python -m benchmarks.suite_under_load [--times 3] [--busy 2] [--output FILE] [-- OPTIONS]
 
-Without words the whole suite runs. `--busy` processes that only compute run beside it (one for
-each core unless it is given), at the tests' own priority. One line a run: tests passed, failed,
-duration, load; the names of failed tests follow. Exit status 1 where a test of any run failed.
+OPTIONS are pytest's; without any the whole suite runs. `--busy` processes that only compute run
+beside it (one for each core unless it is given), at the tests' own priority. One line a run: tests
+passed, failed, duration, load; the names of failed tests follow, and FILE takes all that pytest
+wrote. Exit status 1 where a test of any run failed.
 """
 
 from __future__ import annotations
@@ -46,12 +47,15 @@ def load(busy: int) -> Iterator[None]:
             process.join()
 
 
-def run(arguments: list[str]) -> tuple[bool, str]:
+def run(options: list[str], output: Path | None) -> tuple[bool, str]:
     """Run pytest once; returns whether all passed, and the line of it."""
     began_s = time.monotonic()
-    command = [sys.executable, "-m", "pytest", "-rfE", *arguments]
+    command = [sys.executable, "-m", "pytest", "-rfE", *options]
     wide = os.environ | {"COLUMNS": "200"}  # or the reasons of failures are cut off
     run_ = subprocess.run(command, cwd=ROOT, env=wide, capture_output=True, text=True, check=False)
+    if output is not None:
+        with output.open("a") as file:
+            file.write(run_.stdout + run_.stderr)
     counted = {what: int(count) for count, what in _COUNTED.findall(run_.stdout[-400:])}
     failed = re.findall(r"(?m)^(?:FAILED|ERROR) .*$", run_.stdout)
     line = (
@@ -67,12 +71,13 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     asked.add_argument("--times", type=int, default=3)
     asked.add_argument("--busy", type=int, default=os.cpu_count() or 2)
-    asked.add_argument("words", nargs="*", help="for pytest; after a --")
+    asked.add_argument("--output", type=Path)
+    asked.add_argument("options", nargs="*", help="for pytest; after a --")
     given = asked.parse_args()
     good = True
     with load(given.busy):
         for number in range(given.times):
-            passed, line = run(given.arguments)
+            passed, line = run(given.options, given.output)
             good = good and passed
             print(f"run {number + 1}: {line}", flush=True)
     sys.exit(not good)
