@@ -8,7 +8,7 @@ import resource
 import signal
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from benchmarks.fault_runs.launch import Launch
@@ -188,7 +188,17 @@ _CONTROLLER_DIES = Fault(
     halt_s=0.6,
     restore=_revive_arm,
 )
+_CABLE_CUT = Fault(
+    "cable cut",
+    lambda stand, _: stand.arm.cut(),
+    exits=(SAFETY,),
+    patterns=_NOBODY_KNOWS,
+    halt_s=1.5,
+    restore=_restore_arm,
+)
 """Of an arm, whoever made it."""
+
+_SILENT = ("silent|did not answer|does not answer", *_NOBODY_KNOWS)
 
 _UR_CHILD = "ur/child.py"
 _UR = (
@@ -218,18 +228,11 @@ _UR = (
         "controller mute",
         _mute,
         exits=(SAFETY,),
-        patterns=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
+        patterns=_SILENT,
         halt_s=1.0,
         restore=_restore_arm,
     ),
-    Fault(
-        "cable cut",
-        lambda stand, _: stand.arm.cut(),
-        exits=(SAFETY,),
-        patterns=("silent|did not answer|does not answer", *_NOBODY_KNOWS),
-        halt_s=1.0,
-        restore=_restore_arm,
-    ),
+    replace(_CABLE_CUT, patterns=_SILENT, halt_s=1.0),
     Fault(
         "connections dropped",
         lambda stand, _: stand.arm.drop(),
@@ -345,14 +348,7 @@ _ABB = (
         halt_s=0.6,
         restore=_restore_arm,
     ),
-    Fault(
-        "cable cut",
-        lambda stand, _: stand.arm.cut(),
-        exits=(SAFETY,),
-        patterns=_NOBODY_KNOWS,
-        halt_s=1.5,
-        restore=_mend_cable,
-    ),
+    replace(_CABLE_CUT, restore=_mend_cable),
     _CONTROLLER_DIES,
     Fault("connections dropped", lambda stand, _: stand.arm.drop(), survived=True),
     Fault(

@@ -8,7 +8,7 @@ what the model leaves out come on top.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -125,12 +125,12 @@ def projection_change_px(
     joint: Estimate, views: Views, pixels_px: FloatArray, distance_m: FloatArray
 ) -> FloatArray:
     """(D, G, 2, p) of those pixels, by each of the p numbers; see `projection_sigma_px`."""
-    out = []
-    for d in distance_m:
-        part, _ = _part(joint, views, float(d))
-        shown = _shown(joint, views, part, pixels_px, float(d))
-        out.append(_change_of_pixels(joint, shown)[:, part.corner_count // 2])
-    return np.array(out)
+    return np.array(
+        [
+            _change_of_pixels(joint, shown)[:, shown.board.corner_count // 2]
+            for shown in _shown_at(joint, views, pixels_px, distance_m)
+        ]
+    )
 
 
 def focal_length_sigma_px(joint: Estimate, views: Views, distance_m: FloatArray) -> FloatArray:
@@ -173,9 +173,7 @@ def workpiece_change_m(
 ) -> FloatArray:
     """(D, G, 3, p) of that place, by each of the p numbers; see `workpiece_sigma_m`."""
     out = []
-    for d in distance_m:
-        part, _ = _part(joint, views, float(d))
-        shown = _shown(joint, views, part, pixels_px, float(d))
+    for shown in _shown_at(joint, views, pixels_px, distance_m):
         change = _change_of_pixels(joint, shown)
         out.append(
             _change_of_place(joint, shown) @ change.reshape(len(shown), -1, change.shape[-1])
@@ -210,6 +208,15 @@ def _shown(
         points[:, :2] += step
     poses = rigid.compose(np.zeros_like(points), points - part.corners_m.mean(axis=0))
     return views_that_see(joint.model, views, part, poses, distance_m)
+
+
+def _shown_at(
+    joint: Estimate, views: Views, pixels_px: FloatArray, distance_m: FloatArray
+) -> Iterator[Views]:
+    """Views of the part for each distance, one with its middle at each pixel."""
+    for d in distance_m:
+        part, _ = _part(joint, views, float(d))
+        yield _shown(joint, views, part, pixels_px, float(d))
 
 
 def _change_of_pixels(joint: Estimate, shown: Views) -> FloatArray:

@@ -26,6 +26,16 @@ from sim.render import Sensor
 
 _UNKNOWN_LENS = Lens(focal_length_mm=8.0, f_number=8.0)
 """Where the file does not state; it shapes the blur in pictures and nothing else."""
+LOGGED_COLUMNS = (
+    "t_s",
+    "joint_velocity_rad_s",
+    "approach_joints_rad",
+    "temperature_c",
+    "focus_position",
+    "focus_distance_m",
+    "exposure_s",
+)
+"""What a plan's views may carry of a log of their own, besides joints and pose."""
 
 
 def simulated_cell(
@@ -186,22 +196,13 @@ def _blank(plan: Plan, cell: SimulatedCell) -> Views:
     return replace(blank, payload_kg=cell.payload_kg, robot_model=cell.robot_model or None)
 
 
-_LOGGED = (
-    "t_s",
-    "joint_velocity_rad_s",
-    "approach_joints_rad",
-    "temperature_c",
-    "focus_position",
-    "focus_distance_m",
-    "exposure_s",
-)
-
-
 def _with_logged(plan: Plan, log: Views) -> Views:
     """`log` with whatever the plan's views carry of a log of their own."""
-    columns = {name: getattr(log, name).copy() for name in (*_LOGGED, "base_from_flange", "frame")}
+    columns = {
+        name: getattr(log, name).copy() for name in (*LOGGED_COLUMNS, "base_from_flange", "frame")
+    }
     for index, view in enumerate(plan.file.views):
-        for name in _LOGGED:
+        for name in LOGGED_COLUMNS:
             value = getattr(view, name)
             if value is not None:
                 columns[name][index] = value

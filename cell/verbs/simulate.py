@@ -16,7 +16,13 @@ from calib.views import Views
 from cell.devices.factory import simulated_devices
 from cell.devices.log_mixups import MIXUPS, mix_up
 from cell.devices.nominal_cell import nominal
-from cell.devices.simulated_cell import home_of, log_of, present_effect, simulated_cell
+from cell.devices.simulated_cell import (
+    LOGGED_COLUMNS,
+    home_of,
+    log_of,
+    present_effect,
+    simulated_cell,
+)
 from cell.errors import BadAnswer, InputError
 from cell.sequencer.session import header_of, record_plan
 from cell.storage.files.cell_file import EffectFile, Simulation
@@ -28,17 +34,8 @@ from cell.storage.recording.header import Capture
 from sim.cell import SimulatedCell
 from sim.synthesize import synthesize
 
-_SLIP_STREAM = 101
-_COLUMNS = (
-    "t_s",
-    "joints_rad",
-    "joint_velocity_rad_s",
-    "approach_joints_rad",
-    "temperature_c",
-    "focus_position",
-    "focus_distance_m",
-    "exposure_s",
-)
+_MIXUP_STREAM = 101
+_COLUMNS = ("joints_rad", *LOGGED_COLUMNS)
 
 
 def simulate_corners(plan: Plan, folder: Path, seed: int | None = None) -> int:
@@ -83,7 +80,7 @@ def simulated_views(plan: Plan, cell: SimulatedCell) -> Views:
     """What the plan's simulated cell would record, without a file; raises `InputError`."""
     views = synthesize(cell, log_of(plan, cell))
     effects = plan.cell.simulation.effects if plan.cell.simulation else ()
-    rng = cell.random(_SLIP_STREAM)
+    rng = cell.random(_MIXUP_STREAM)
     for effect in effects:
         if effect.name in MIXUPS:
             views = mix_up(views, effect, rng)

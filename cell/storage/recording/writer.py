@@ -154,10 +154,9 @@ class RecordingWriter:
         kept = {k: v for k, v in {**extra, **values}.items() if v is not None}
         if kept == extra:
             return
-        disk_errors = self.header.as_mapping()
-        disk_errors = {k: v for k, v in disk_errors.items() if k not in extra} | kept
-        self.header = Header.model_validate(disk_errors)
-        write_atomically(self.folder / header_file.FILE_NAME, yaml_text(disk_errors))
+        header = {k: v for k, v in self.header.as_mapping().items() if k not in extra} | kept
+        self.header = Header.model_validate(header)
+        write_atomically(self.folder / header_file.FILE_NAME, yaml_text(header))
 
     def close(self) -> None:
         """Let go of the files. Idempotent."""
