@@ -32,32 +32,33 @@ _PASSES = {
     "sensor": "tilt, shutter, pixels",
     "detector": "what is found",
 }
-_CORNER = (
+CORNER = (
+    ("calib.chain.model:evaluate", "clock, arm, mount and board in turn, each with its effects"),
     (
         "calib.chain.model:start",
         "the logged pose and joints of each frame become the chain's start",
     ),
-    ("calib.chain.model:evaluate", "clock, arm, mount and board in turn, each with its effects"),
     ("calib.chain.state:ChainState.move_arm", "moved joints and links move the logged flange"),
     ("calib.chain.state:ChainState.place", "where the camera sees the board: camera_from_board"),
     ("calib.chain.projection:project", "lens and sensor: the corner becomes a pixel"),
     ("calib.detection:detect", "the same corner in a picture, with its uncertainty"),
-    ("calib.solver.joint:fit_joint", "the difference of both, made least over all corners"),
     ("calib.calibration:calibrate", "every solution of a recording"),
+    ("calib.solver.joint:fit_joint", "the difference of both, made least over all corners"),
     ("calib.calibration.mapping:as_mapping", "the numbers as `calibration.json` has them"),
     ("cell.views.report.from_calibration:solution_residuals", "what is left, for the drawings"),
     ("cell.views.report:write_report", "`report.html`"),
 )
-_PLAN = (
-    ("cell.cli.run:run", "words in: the file's name and the options"),
+"""In the order of a dry run, whose camera evaluates the chain before anything is fitted."""
+PLAN = (
+    ("cell.cli.run:run", "the command line: the file's name and the options"),
     ("cell.storage.files.plan_file:read_plan", "YAML to a checked plan and its cell"),
-    ("cell.devices.factory:real_devices", "arm and camera (`simulated_devices` in a dry run)"),
     ("cell.verbs.run:record", "run, page and running estimate put together"),
+    ("cell.devices.factory:simulated_devices", "arm and camera (`real_devices` without --dry-run)"),
     ("cell.sequencer.session:record_plan", "recording and journal opened, or gone on with"),
-    ("cell.sequencer.sequencer:Sequencer", "one loop that owns the arm"),
-    ("cell.sequencer.guard:Guard", "every motion checked before it begins"),
-    ("cell.sequencer.watched_arm:WatchedArm", "moves, reads, stops"),
-    ("cell.storage.recording:RecordingWriter", "a frame on the disk, synced"),
+    ("cell.sequencer.sequencer:Sequencer.run", "one loop that owns the arm"),
+    ("cell.sequencer.guard:Guard.check_plan", "every motion checked before the first begins"),
+    ("cell.sequencer.watched_arm:WatchedArm.go", "moves, reads, stops"),
+    ("cell.storage.recording:RecordingWriter.append", "a frame on the disk, synced"),
     ("cell.verbs.run:evaluate", "calibrated, diagnosed, reported"),
 )
 
@@ -125,7 +126,9 @@ def _page(graph: grimp.ImportGraph, arrows: Counter[tuple[str, str]]) -> str:
         "![The measurement chain](pictures/chain.svg)",
         "## The floors",
         "`calib`, `drivers` and `sim` are libraries; `cell` is the operator's side, on six floors."
-        f" {len(inside)} arrows join them, every one downwards.",
+        f" {len(inside)} arrows join them, every one downwards. Before [decision 13]"
+        "(decisions/0013-six-floors.md), which lists where what was hardest to find is now, there"
+        " were 26 rooms on ten floors, 123 arrows, two of them upwards, and three circles.",
         "![Packages and floors, with the imports between them](pictures/floors.svg)",
         _table(
             ("floor", "modules", "is", "imports from (times)"),
@@ -140,9 +143,9 @@ def _page(graph: grimp.ImportGraph, arrows: Counter[tuple[str, str]]) -> str:
             ],
         ),
         "## One corner, from the pose to the report",
-        _stops(_CORNER),
+        _stops(CORNER),
         "## One plan, from YAML to a recording",
-        _stops(_PLAN),
+        _stops(PLAN),
         "## Where a new thing goes",
         "CONTRIBUTING.md at the top of the project says it file by file.",
     ]

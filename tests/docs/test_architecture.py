@@ -45,3 +45,11 @@ def test_every_top_package_says_what_it_may_import() -> None:
     for package in ("calib", "cell", "drivers", "sim", *(f"cell/{floor}" for floor in FLOORS)):
         text = (ROOT / package / "__init__.py").read_text(encoding="utf-8")
         assert "import" in text.split('"""')[1].lower(), package
+
+
+def test_decision_13_says_where_things_are() -> None:
+    text = (ROOT / "docs/decisions/0013-six-floors.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[3] for line in text.splitlines() if line.startswith("| ")][1:]
+    places = [path for row in rows for path in re.findall(r"`(cell/[\w./]+)`", row)]
+    assert len(places) == 3
+    assert [path for path in places if not (ROOT / path).exists()] == []

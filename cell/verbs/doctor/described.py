@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from calib.chain.kinematics import MODELS, UnknownArm, arm
 from cell.sequencer.bounded import check_bounded
-from cell.storage.files.cell_file import AbbRobot, CellFile, UniversalRobot
+from cell.storage.files.cell_file import CellFile
 from cell.verbs.doctor.finding import Finding
 from drivers.errors import SafetyError
 
 
 def described(cell: CellFile) -> list[Finding]:
     """The arm's kinematics, and for a real arm the place it may move in."""
-    real = isinstance(cell.robot, UniversalRobot | AbbRobot)
+    real = cell.robot.driver != "sim"
     return [_kinematics(cell, needed=real), *([_bounds(cell)] if real else [])]
 
 
