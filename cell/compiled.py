@@ -28,8 +28,11 @@ from pathlib import Path
 from typing import Any
 
 VARIABLE = "NUMBA_CACHE_DIR"
-VERBS = ("run", "bootstrap", "plan", "simulate", "calibrate", "diagnose", "verify", "study")
-"""Those that cannot do without compiled code."""
+VERBS = (
+    "run", "bootstrap", "plan", "simulate", "calibrate", "diagnose", "verify", "study", "compare",
+    "import",
+)  # fmt: skip
+"""Those that may use compiled code."""
 
 _CODE = Path(__file__).parents[1] / "calib"
 _ROOMS = (_CODE, _CODE.with_name("sim"))
@@ -60,16 +63,32 @@ def prepare(arguments: Sequence[str]) -> None:
         if own is not None:
             os.environ[VARIABLE] = str(own)
     forget_stale()
-    asked = next((word for word in arguments if word in VERBS), None)
     helps = {"-h", "--help"} & set(arguments)
-    if asked is None or helps:
+    if helps or not any(word in VERBS for word in arguments):
         return
     write_in_turn()
     if not _kept():
-        sys.stderr.write(
-            "first use here: compiling for this processor, once, some twenty seconds\n"
-        )
-        sys.stderr.flush()
+        announce_first_compilation()
+
+
+def announce_first_compilation() -> None:
+    """Say once why it takes so long, when numba begins to compile and not before."""
+    from numba.core import event as numba_event
+
+    event: Any = numba_event  # without types
+
+    class Announcer(numba_event.Listener):
+        def on_start(self, _event: object) -> None:
+            event.unregister("numba:compile", self)
+            sys.stderr.write(
+                "first use here: compiling for this processor, once, some twenty seconds\n"
+            )
+            sys.stderr.flush()
+
+        def on_end(self, _event: object) -> None:
+            """Nothing to say."""
+
+    event.register("numba:compile", Announcer())
 
 
 def forget_stale() -> None:

@@ -174,7 +174,7 @@ class SimCamera:
             )
         spec = self._cell.camera
         steps = _within("focus position", setting.position, (0.0, float(spec.focus_steps)))
-        return spec.nearest_focus_m / max(1.0 - steps / spec.focus_steps, 1e-6)
+        return spec.focus_distance_at(steps)
 
     def _focus_position(self) -> float | None:
         spec = self._cell.camera

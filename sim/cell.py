@@ -57,6 +57,10 @@ class CameraSpec:
         """Diameter of the entrance pupil."""
         return self.focal_length_m / self.f_number
 
+    def focus_distance_at(self, step: float) -> float:
+        """Distance (m) that the lens is focused at with the drive at a step of its range."""
+        return self.nearest_focus_m / max(1.0 - step / self.focus_steps, 1e-6)
+
 
 @dataclass(frozen=True)
 class SimulatedCell:

@@ -71,7 +71,7 @@ def synthesize_corners(
     corners = state.pixels()
     corners += corner_sigma_px * corner_rng.standard_normal(corners.shape)
     corners[~_visible(state, corners, log)] = np.nan
-    focus = state.distance_m if log_focus else log.focus_distance_m
+    focus = state.focused_m if log_focus else log.focus_distance_m
     return replace(log, corners_px=corners, focus_distance_m=focus)
 
 

@@ -20,7 +20,7 @@ def board(
         typer.Argument(
             help="ROWSxCOLSxSQUARE_M in inner corners (7x10x0.025), or"
             " charuco:SQUARES_XxSQUARES_YxSQUARE_MxMARKER_M:DICTIONARY; for a .yaml:"
-            " aprilgrid:TAGS_XxTAGS_YxTAG_MxGAP_M."
+            " aprilgrid:TAGS_XxTAGS_YxTAG_MxGAP_M. Or a cell file, for its board."
         ),
     ],
     output: Annotated[

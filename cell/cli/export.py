@@ -16,6 +16,13 @@ from cell.errors import InputError
 from cell.views.terminal.output import say, show
 
 
+def _formats(begun: str) -> list[str]:
+    """The formats that begin so, for Tab in the shell."""
+    from cell.verbs.export import FORMATS
+
+    return [name for name in FORMATS if name.startswith(begun)]
+
+
 def export(
     calibration: Annotated[Path, typer.Argument(help="A calibration.json, or its folder.")],
     tool: Annotated[
@@ -24,6 +31,7 @@ def export(
             "--format",
             help="The camera for ros, opencv, mrcal, kalibr, colmap, json; its place and the"
             " board's for tf, urdf, ur, abb, moveit, easy_handeye2, text.",
+            autocompletion=_formats,
         ),
     ],
     distance: Annotated[

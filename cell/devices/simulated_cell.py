@@ -157,8 +157,23 @@ def log_of(plan: Plan, cell: SimulatedCell) -> Views:
         A view gives only a pose, and the arm cannot reach it or is unknown.
     """
     if all(view.base_from_flange is not None for view in plan.file.views):
-        return _with_logged(plan, _blank(plan, cell))
-    return _with_logged(plan, _tour(plan, cell, _joints(plan, cell)))
+        log = _with_logged(plan, _blank(plan, cell))
+    else:
+        log = _with_logged(plan, _tour(plan, cell, _joints(plan, cell)))
+    return _focused(plan, log, cell.camera) if plan.file.exposure.focus == "position" else log
+
+
+def _focused(plan: Plan, log: Views, camera: CameraSpec) -> Views:
+    """The log of lenses that went to the plan's positions, where none says how far they focus."""
+    indices = range(len(plan.file.views))
+    position = np.array([plan.file.focus_position(k) for k in indices], dtype=np.float64)
+    focused_m = np.array([camera.focus_distance_at(step) for step in position])
+    logged = log.focus_distance_m
+    return replace(
+        log,
+        focus_position=position,
+        focus_distance_m=np.where(np.isfinite(logged), logged, focused_m),
+    )
 
 
 def _tour(plan: Plan, cell: SimulatedCell, joints: FloatArray) -> Views:

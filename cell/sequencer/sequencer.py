@@ -308,7 +308,8 @@ class Sequencer:
         operator may give the view up until its picture is taken.
         """
         exposure = self._plan.file.exposure
-        focus = partial(self._camera.focus, FocusSetting(exposure.focus, exposure.focus_position))
+        setting = FocusSetting(exposure.focus, self._plan.file.focus_position(index))
+        focus = partial(self._camera.focus, setting)
         reopened = False
         while not self._requests.skips(index):
             try:

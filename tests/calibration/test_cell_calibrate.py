@@ -1,6 +1,8 @@
 """`cell calibrate` on recordings: files in, files out, clear words for what cannot be."""
 
 import json
+import re
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,8 @@ from calib.views import Views
 from cell.errors import BadAnswer, InputError
 from cell.storage.recording import read_recording
 from cell.verbs.calibrate import calibrate_into, default_folder
+from cell.views.numbers import millimetres
+from cell.views.terminal.summary import answer_line
 from tests.paper.scene import mixed_scene
 
 
@@ -48,7 +52,16 @@ def test_it_writes_the_file_and_the_report_and_leaves_the_recording_alone(tmp_pa
     assert content == json.loads(json.dumps(calibrated.mapping))
     assert content["schema"] == "cell.calibration/1"
     assert len(content["frames_used"]) == 27
-    assert (out / "report.html").stat().st_size > 10_000
+    report = unescape((out / "report.html").read_text())
+    error = content["answer"]["error_at_work_piece_m"]["p95"]
+    assert error > 1e-5
+    shown = millimetres(error)
+    assert f"allows {shown} at the work piece" in answer_line(content), "in the terminal"
+    assert f"allows {shown} at the work piece" in report, "in the first sentence"
+    assert re.search(rf"Error at the work piece</[^>]+>\s*<[^>]+>{re.escape(shown)}<", report), (
+        "tile"
+    )
+    assert f"answer, 95 %: {shown}" in report, "chart"
     assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
 
 

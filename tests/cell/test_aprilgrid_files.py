@@ -13,7 +13,7 @@ from cell.cli.app import app
 from cell.errors import InputError
 from cell.storage.files.board_file import AprilGrid, Chessboard, board_file
 from cell.storage.files.board_option import parse_board
-from cell.storage.files.kalibr_target import kalibr_target, read_kalibr_target
+from cell.storage.files.kalibr_target import kalibr_target
 
 KALIBR = """\
 target_type: 'aprilgrid' #gridtype
@@ -28,12 +28,12 @@ codeOffset: 0            #code offset for the first tag in the aprilboard
 def test_kalibrs_target_is_read_and_written(tmp_path: Path) -> None:
     path = tmp_path / "april.yaml"
     path.write_text(KALIBR)
-    read = read_kalibr_target(path)
+    read = parse_board(str(path))
     assert isinstance(read, AprilGrid)
     assert (read.tags_x, read.tags_y, read.tag_m) == (6, 5, 0.088)
     assert read.gap_m == pytest.approx(0.0264)
     path.write_text(kalibr_target(read))
-    assert read_kalibr_target(path) == read
+    assert parse_board(str(path)) == read
     assert YAML(typ="safe").load(path.read_text())["tagSpacing"] == pytest.approx(0.3)
     assert parse_board(str(path)) == read
 
@@ -42,10 +42,10 @@ def test_kalibrs_chessboard_is_counted_as_ours(tmp_path: Path) -> None:
     path = tmp_path / "chess.yaml"
     text = "target_type: checkerboard\ntargetCols: 6\ntargetRows: 7\n"
     path.write_text(text + "rowSpacingMeters: 0.06\ncolSpacingMeters: 0.06\n")
-    assert read_kalibr_target(path) == Chessboard(type="chessboard", rows=7, cols=6, square_m=0.06)
+    assert parse_board(str(path)) == Chessboard(type="chessboard", rows=7, cols=6, square_m=0.06)
     path.write_text(text + "rowSpacingMeters: 0.06\ncolSpacingMeters: 0.05\n")
     with pytest.raises(InputError, match="only square ones are known"):
-        read_kalibr_target(path)
+        parse_board(str(path))
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_a_target_that_is_none_is_refused(text: str, words: str, tmp_path: Path)
     path = tmp_path / "april.yaml"
     path.write_text(text)
     with pytest.raises(InputError, match=words):
-        read_kalibr_target(path)
+        parse_board(str(path))
 
 
 def test_the_corners_stand_a_tag_and_a_gap_apart_in_turn() -> None:
@@ -80,7 +80,7 @@ def test_cell_board_writes_kalibrs_file_and_names_what_draws_it(tmp_path: Path) 
     out = tmp_path / "target.yaml"
     done = CliRunner().invoke(app, ["board", "aprilgrid:6x6x0.088x0.0264", "-o", str(out)])
     assert done.exit_code == 0
-    assert read_kalibr_target(out).board().corner_count == 144
+    assert parse_board(str(out)).board().corner_count == 144
     refused = CliRunner().invoke(
         app, ["board", "aprilgrid:6x6x0.088x0.0264", "-o", str(tmp_path / "b.pdf")]
     )

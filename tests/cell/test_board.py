@@ -13,7 +13,7 @@ from calib.views import Board
 from cell.errors import InputError
 from cell.verbs.board.pattern import dark
 from cell.verbs.board.sheet import draw_board, sheet
-from tests.cell.test_cli import Cell
+from tests.cell.test_cli import ROOT, Cell
 from tests.cell.test_cli import cell as cell  # a fixture
 
 CHESS = Board("chessboard", 7, 10, 0.025)
@@ -98,5 +98,12 @@ def test_the_verb_says_what_goes_into_the_cell_file(cell: Cell, tmp_path: Path) 
     assert result.status == 0, result.err
     assert "board: {type: chessboard, rows: 7, cols: 10, square_m: 0.025}" in result.out
     assert "11 squares along a row 275.0 mm, 8 along a column 200.0 mm" in result.out
+    of_cell = cell("board", ROOT / "configs" / "ur3-robotiq.cell.yaml", "-o", tmp_path / "c.pdf")
+    assert (of_cell.status, of_cell.out) == (0, result.out.replace("b.pdf", "c.pdf"))
+    neither = tmp_path / "neither.yaml"
+    neither.write_text("name: bench\n")
+    refused = cell("board", neither, "-o", tmp_path / "d.pdf")
+    assert refused.status == 2
+    assert "neither `board`" in refused.err
     assert cell("board", "7x10", "-o", tmp_path / "b.pdf").status == 2
     assert cell("board", "7x10x0.025", "-o", tmp_path / "no" / "b.pdf").status == 2

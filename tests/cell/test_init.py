@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from calib.chain.kinematics import MODELS, arm
-from cell.devices.nominal_cell import nominal
+from cell.devices.nominal_cell import USUAL_NOISE, nominal
 from cell.sequencer.bounded import check_bounded
 from cell.storage.files.cell_file import read_cell
 from cell.verbs.init.answers import HOMES_DEG, Answers
@@ -40,7 +40,10 @@ def test_without_any_answer_it_is_a_simulated_cell_that_can_be_planned(
     path = tmp_path / "bench" / "cell.yaml"
     assert json.loads(result.out)["file"] == str(path)
     made = read_cell(path)
-    assert nominal(made).simulation is not None
+    simulated = nominal(made).simulation
+    assert simulated is not None
+    assert simulated.noise == USUAL_NOISE
+    assert min(USUAL_NOISE.corner_px, USUAL_NOISE.arm_position_m) > 0
     assert cell("doctor", path).status == 0
     again = cell("init", tmp_path / "bench")
     assert again.status == 2

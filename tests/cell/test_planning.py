@@ -311,6 +311,17 @@ def test_less_than_was_asked_for_is_reported_with_the_reason() -> None:
     assert "are out of the arm's reach" in why
 
 
+def test_distances_in_the_middle_without_a_view_are_said() -> None:
+    plan = read_plan(CONFIGS / "ur3-robotiq.plan.yaml")
+    away = [float(view.name.split()[-2]) for view in plan.file.views]  # type: ignore[union-attr]
+    near_and_far = [v for v, d in zip(plan.file.views, away, strict=True) if not 0.4 < d < 0.5]
+    file = plan.file.model_copy(update={"views": tuple(near_and_far)})
+    gap, _ = shortfalls(replace(plan, file=file), PlanSize(1, 1))
+    between = re.fullmatch(r"no view is between (0\.\d+) and (0\.\d+) m", gap)
+    assert between is not None
+    assert (float(between[1]), float(between[2])) == pytest.approx((0.4, 0.5), abs=0.03)
+
+
 def test_a_plan_survives_writing_and_reading(tmp_path: Path) -> None:
     plan = read_plan(CONFIGS / "ur3-robotiq.plan.yaml")
     inline = plan.file.model_copy(update={"cell": plan.cell})

@@ -18,6 +18,7 @@ from calib.calibration.mapping import as_mapping
 from calib.chain.rigid import from_vector
 from cell.cli.app import app
 from cell.errors import InputError
+from cell.storage.files.provenance import provenance
 from cell.verbs.compare import Side, compare, side_of
 from cell.verbs.compare.field import differences, field_of
 from cell.verbs.compare.page import render
@@ -39,7 +40,10 @@ def _content(seed: int, k_px_m2: float = 0.0, mount: str = "eye_in_hand") -> str
         k1=-0.05,
         mount=mount,
     )
-    return json.dumps(as_mapping(calibrate(true.views), f"run {seed}"))
+    header = {"created": "2026-11-29T13:00:00+01:00", "camera": {"model": "eye", "serial": "C7"}}
+    found = as_mapping(calibrate(true.views), f"run {seed}")
+    origin = provenance(header)
+    return json.dumps(found | origin | {"robot": (found.get("robot") or {}) | origin["robot"]})
 
 
 def _calibrated(seed: int, k_px_m2: float = 0.0, mount: str = "eye_in_hand") -> Side:
@@ -214,6 +218,8 @@ def test_the_page_stands_alone_with_a_map_for_each_part() -> None:
     assert "agree within their uncertainty" in page
     assert "<link" not in page
     assert "<script" not in page
+    assert page.count("Recorded 2026-11-29T13:00:00+01:00; camera eye (serial C7)") == 2
+    assert page.count("by calibration-cell ") == 2
 
 
 def test_the_verb_takes_files_and_folders_and_speaks_json(tmp_path: Path) -> None:
@@ -229,6 +235,8 @@ def test_the_verb_takes_files_and_folders_and_speaks_json(tmp_path: Path) -> Non
     assert page.stat().st_size > 20_000
     output = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
     assert output["schema"] == "cell.comparison/1"
+    assert output["a"]["camera"] == {"model": "eye", "serial": "C7"}
+    assert output["a"]["program"].startswith("calibration-cell ")
     assert output["mounted"]["beyond_chance"] is False
     assert np.shape(output["camera"]["difference_px"]) == (4, 63, 2)
 

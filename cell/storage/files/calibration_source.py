@@ -14,6 +14,7 @@ from pydantic import (
     PositiveFloat,
     PositiveInt,
     ValidationError,
+    model_validator,
 )
 
 from calib.paper.focus_law import LAWS
@@ -150,6 +151,23 @@ class CrossValidationSource(_Part):
     """How many times the stated sigmas the frames ask for."""
 
 
+class _Device(_Part):
+    """Which camera or robot it was."""
+
+    model: str | None = None
+    serial: str | None = None
+
+
+class OriginSource(_Part):
+    """When, by which program and of which devices it was made, as far as the file says."""
+
+    recorded: str | None = None
+    created: str | None = None
+    program: str | None = None
+    camera: _Device | None = None
+    robot: _Device | None = None
+
+
 class PlacementSource(_Part):
     """Where camera and board are, as far as it was determined."""
 
@@ -172,8 +190,17 @@ class CalibrationSource(PlacementSource):
     zones: ZonesSource | None = None
     focus_law: LawSource | None = None
     solutions: dict[str, SolutionSource]
+    origin: OriginSource = OriginSource()
     robot: Annotated[RobotSource | None, BeforeValidator(_fitted_or_none)] = None
     cross_validation: CrossValidationSource | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_origin(cls, data: Any) -> Any:
+        """The file's own keys of its origin; `robot` has the fit's numbers beside them."""
+        if not isinstance(data, dict):
+            return data
+        return data | {"origin": {key: data.get(key) for key in OriginSource.model_fields}}
 
     @property
     def range_m(self) -> tuple[float, float] | None:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, PositiveInt, model_validator
 
-from cell.storage.files.parts import Part, Positive
+from cell.storage.files.parts import Finite, Part, Positive
 from cell.storage.incoming.limits import PICTURE_SIDE
 from cell.storage.incoming.pictures import check_pixels
 
@@ -50,6 +50,8 @@ class SimulatedCamera(Part):
     height: Side
     pixel_size_um: Positive | None = None
     focus: Literal["auto", "manual", "motorised", "fixed"] | None = None
+    focus_positions: tuple[Finite, ...] | None = Field(default=None, min_length=1, max_length=100)
+    """Positions of a motorised focus drive, in its steps: a plan's views take them in turn."""
     lens: Lens | None = None
     body: CameraBody | None = None
     """Where it is not given: 7 x 7 cm across, 3 cm ahead of the pupil, and from there back to the
@@ -58,6 +60,12 @@ class SimulatedCamera(Part):
     @model_validator(mode="after")
     def _affordable(self) -> Self:
         check_pixels(self.width, self.height)
+        return self
+
+    @model_validator(mode="after")
+    def _positions_of_a_drive(self) -> Self:
+        if self.focus_positions is not None and self.focus != "motorised":
+            raise ValueError("focus_positions needs focus: motorised")
         return self
 
 

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from ruamel.yaml.comments import CommentedMap
 
 from cell.errors import InputError
 from cell.storage.files.board_file import AprilGrid, Chessboard
-from cell.storage.files.yaml_model import parse_model, read_mapping
+from cell.storage.files.yaml_model import parse_model
 
 
 class _Target(BaseModel):
@@ -68,10 +69,11 @@ _KINDS: dict[str, type[_AprilGrid] | type[_Checkerboard]] = {
 }
 
 
-def read_kalibr_target(path: Path) -> AprilGrid | Chessboard:
-    """The board of a target file; raises `InputError` with line and key of what is wrong."""
-    data = read_mapping(path)
+def kalibr_board(path: Path, data: CommentedMap) -> AprilGrid | Chessboard:
+    """The board of a target file's `data`; raises `InputError` with line and key of a fault."""
     kind = data.get("target_type")
+    if kind is None:
+        raise InputError(f"{path}: has neither `board`, as a cell file, nor Kalibr's `target_type`")
     if kind not in _KINDS:
         raise InputError(f"{path}: target_type is {kind!r}; known are {', '.join(_KINDS)}")
     try:

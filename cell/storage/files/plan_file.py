@@ -41,7 +41,8 @@ class View(Part):
     """One pose to take a frame at: joint angles, or the flange's pose.
 
     A plan made from a recording (a twin) may carry the log's columns too; they are given to the
-    simulated recording as they are and do not move anything.
+    simulated recording as they are and do not move anything, but for `focus_position` where
+    `exposure.focus` is `position`: the lens goes there before the frame.
     """
 
     name: str | None = None
@@ -91,16 +92,11 @@ class Exposure(Part):
     exposure_s: Duration | None = None
     gain_db: Finite | None = None
     focus: Literal["auto", "hold", "position"] = "hold"
-    """`auto`: focus once at every pose, then log; `position`: go to `focus_position`."""
+    """`auto`: focus once at every pose, then log; `position`: go to the view's `focus_position`, or
+    to the one given here."""
     focus_position: Finite | None = None
     timeout_s: Duration = 5.0
     """How long to wait for a frame."""
-
-    @model_validator(mode="after")
-    def _position_given(self) -> Self:
-        if self.focus == "position" and self.focus_position is None:
-            raise ValueError("focus: position needs focus_position")
-        return self
 
 
 class Checks(Part):
@@ -161,6 +157,23 @@ class PlanFile(Part):
         if self.until is not None and not self.checks.board:
             raise ValueError("until needs the board's corners: take checks.board: false away")
         return self
+
+    @model_validator(mode="after")
+    def _position_given(self) -> Self:
+        if self.exposure.focus != "position" or self.exposure.focus_position is not None:
+            return self
+        without = [k for k, view in enumerate(self.views) if view.focus_position is None]
+        if without:
+            raise ValueError(
+                "exposure.focus: position needs exposure.focus_position, or a focus_position in"
+                f" every view; views.{without[0]} has none"
+            )
+        return self
+
+    def focus_position(self, index: int) -> float | None:
+        """Where the focus drive goes for a view with `exposure.focus: position`."""
+        own = self.views[index].focus_position
+        return self.exposure.focus_position if own is None else own
 
     def as_mapping(self) -> dict[str, Any]:
         """Plain dicts and lists, keys as in the file, defaults left out."""

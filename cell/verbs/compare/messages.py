@@ -84,6 +84,7 @@ def as_mapping(comparison: Comparison) -> dict[str, Any]:
             "recording": side.recording,
             "solution": side.solution,
             "law": side.law,
+            **side.origin.model_dump(),
         }
     content |= {"distances_m": field.distances_m.tolist(), "pixels": field.pixels.tolist()}
     content |= {"camera": None, "mounted": None, "notes": list(comparison.notes)}

@@ -10,6 +10,7 @@ import numpy as np
 from cell.storage.atomic import write_atomically
 from cell.verbs.compare.comparison import Comparison, Difference
 from cell.verbs.compare.messages import HEAD, TITLES, parts, table, verdict
+from cell.views.provenance_text import provenance_text
 from cell.views.report import html
 from cell.views.report.figures.canvas import BLACK
 from cell.views.report.plot import Figure, panels
@@ -25,7 +26,8 @@ def render(comparison: Comparison) -> str:
     """The whole page as HTML text."""
     style = files("cell.views.report").joinpath("style.css").read_text(encoding="utf-8")
     sides = [
-        f"{letter}: {side.label}, recording {side.recording}, solution {side.solution}"
+        f"{letter}: {side.label}, recording {side.recording}, solution {side.solution}."
+        f" {provenance_text(side.origin.model_dump())}"
         for letter, side in (("A", comparison.a), ("B", comparison.b))
     ]
     sections = "".join(

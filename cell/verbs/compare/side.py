@@ -16,6 +16,7 @@ from cell.storage.files.calibration_source import (
     DISTORTION,
     CalibrationSource,
     LawSource,
+    OriginSource,
     SolutionSource,
     TransformSource,
 )
@@ -56,6 +57,8 @@ class Side:
         `flange_from_camera` or `base_from_camera` and its (4, 4); empty and None where unknown.
     has_corner:
         True where the scale factors have a corner that no smooth law has.
+    origin:
+        When, by which program and of which devices it was made.
     too_sure:
         How many times the stated sigmas its cross-validation asks for; one where it does not.
     """
@@ -73,6 +76,7 @@ class Side:
     place: FloatArray | None
     has_corner: bool
     too_sure: float
+    origin: OriginSource
 
     @property
     def knows_chance(self) -> bool:
@@ -140,6 +144,7 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
         place=None if place is None else place.matrix,
         has_corner=law is not None and zones is not None and zones.method == "change_point",
         too_sure=1.0 if checked is None else checked.factor,
+        origin=calibration.origin,
     )
 
 

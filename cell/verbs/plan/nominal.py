@@ -12,28 +12,25 @@ from calib.chain.effects import make_effect
 from calib.chain.model import CellModel
 from calib.solver.noise import Noise
 from calib.views import FloatArray, Views
-from cell.devices.nominal_cell import nominal
+from cell.devices.nominal_cell import USUAL_NOISE, nominal
 from cell.devices.simulated_cell import simulated_cell
 from cell.storage.files.cell_file import CellFile
 from cell.verbs.plan.reach import layout_of
 from sim.cell import SimulatedCell
-
-USUAL_NOISE = Noise(corner_px=0.1, flange_m=3e-5, flange_rad=1e-4)
-"""A good detector and an arm of this class; taken where the cell file does not state."""
 
 _STANDS = ("fixed", "manual")
 
 
 def assumed_noise(cell: CellFile) -> tuple[Noise, str]:
     """Noise levels to plan with, and where they are from."""
-    reported = cell.simulation.noise if cell.simulation else None
-    if reported is None:
-        return USUAL_NOISE, "assumed; the cell file does not state it"
+    reported = cell.simulation.noise if cell.simulation else USUAL_NOISE
     noise = Noise(
         corner_px=reported.corner_px or USUAL_NOISE.corner_px,
-        flange_m=reported.arm_position_m or USUAL_NOISE.flange_m,
-        flange_rad=reported.arm_rotation_rad or USUAL_NOISE.flange_rad,
+        flange_m=reported.arm_position_m or USUAL_NOISE.arm_position_m,
+        flange_rad=reported.arm_rotation_rad or USUAL_NOISE.arm_rotation_rad,
     )
+    if cell.simulation is None:
+        return noise, "assumed; the cell file does not state it"
     levels = (reported.corner_px, reported.arm_position_m, reported.arm_rotation_rad)
     return noise, "simulation.noise" if all(levels) else "simulation.noise, zeros as usual"
 

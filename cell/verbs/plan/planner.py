@@ -78,11 +78,24 @@ def _by_hand(cell: CellFile, size: PlanSize) -> list[Candidate]:
 
 def _plan(cell: CellFile, tour: Sequence[Candidate], cell_path: str | None) -> PlanFile:
     views = [view_of(number, candidate) for number, candidate in enumerate(tour)]
+    if cell.camera.focus_positions is not None:
+        _sweep_focus(views, tour, cell.camera.focus_positions)
     plan: dict[str, object] = {"schema": SCHEMA, "name": cell.name, "views": views}
     plan["cell"] = cell_path or cell
     if cell.camera.focus == "auto":
         plan["exposure"] = {"focus": "auto"}
+    elif cell.camera.focus_positions is not None:
+        plan["exposure"] = {"focus": "position"}
     return PlanFile.model_validate(plan)
+
+
+def _sweep_focus(
+    views: Sequence[dict[str, object]], tour: Sequence[Candidate], positions: Sequence[float]
+) -> None:
+    """Give the views the positions in turn, so that each has near and far ones of both kinds."""
+    order = sorted(range(len(tour)), key=lambda k: (tour[k].station, tour[k].distance_m))
+    for rank, k in enumerate(order):
+        views[k]["focus_position"] = positions[rank % len(positions)]
 
 
 def view_of(number: int, candidate: Candidate) -> dict[str, object]:

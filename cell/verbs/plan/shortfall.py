@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -23,6 +23,10 @@ from drivers.errors import SafetyError
 _TRIED = 36
 _GAP_SHARE = 0.1
 """Of the way from the nearest to the farthest distance: less than that is no gap."""
+
+_INNER_GAP_SHARE = 0.2
+_GAP_VIEWS = 4.0
+"""Between views less than the share is no gap, nor what so many views spread evenly would leave."""
 
 
 def shortfalls(plan: Plan, size: PlanSize) -> tuple[str, ...]:
@@ -67,6 +71,10 @@ def _gaps(plan: Plan) -> Iterator[str]:
         yield f"no view is nearer than {min(depth):.3f} m, and {near:g} m was asked for"
     if max(depth) < far - _GAP_SHARE * (far - near):
         yield f"no view is farther than {max(depth):.3f} m, and {far:g} m was asked for"
+    wide = max(_INNER_GAP_SHARE, _GAP_VIEWS / len(depth)) * (far - near)
+    for below, above in pairwise(sorted(depth)):
+        if above - below > wide:
+            yield f"no view is between {below:.3f} and {above:.3f} m"
 
 
 def _camera_from_board(cell: CellFile, guard: Guard, joints_rad: FloatArray) -> RigidTransform:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cell.views.answer_text import SIGMAS
-from cell.views.numbers import solution_name
+from cell.views.numbers import millimetres, solution_name
 from cell.views.report.answer_values import answer_of, shared_by_distance
 from cell.views.report.data import ReportData
 from cell.views.report.figures.canvas import style
@@ -43,4 +43,5 @@ def _answer(ax: Axes, data: ReportData) -> None:
                 label="calibration as a whole, two sigma")  # fmt: skip
     error = (answer_of(data) or {}).get("error_at_work_piece_m")
     if error is not None:
-        ax.axhline(error["p95"] * 1e3, linestyle=":", color="#333333", label="answer, 95 %")
+        ax.axhline(error["p95"] * 1e3, linestyle=":", color="#333333",
+                   label=f"answer, 95 %: {millimetres(error['p95'])}")  # fmt: skip
