@@ -20,8 +20,8 @@ EFFECT = Effect(
     physics="The camera warms up and its sensor moves behind the lens, so the picture drifts.",
     equation="(u0, v0) = cold + (u_px, v_px) * (1 - exp(-(t - start) / tau))",
     source=(
-        "image drift of a camera that heats itself: Handel 2007; Ma, Pang, Ma 2012 (systematic"
-        " errors in digital image correlation caused by self-heating of a digital camera)"
+        "image drift of a camera that heats itself: Handel 2007; sensor and lens expansion, Sci."
+        " Rep. 9 (2019), camera warm-up"
     ),
     parameters=(
         Parameter("u_px", "px", 1.0, -50.0, 50.0),
