@@ -2,10 +2,36 @@
 
 from __future__ import annotations
 
+import json
+import re
 import socket
 import time
+from typing import Any
 
 _LONGEST_TEXT = 160
+_DEEPEST = 64
+_BRACKETS = re.compile(rb'"(?:[^"\\]|\\.)*(?:"|\\?\Z)|[\[\]{}]', re.DOTALL)
+
+
+def check_depth(data: bytes) -> None:
+    """Raise `ValueError` for JSON nested deeper than any device nests.
+
+    A parser takes the stack to its end for it, where whatever else happens to run fails, too.
+    """
+    depth = 0
+    for found in _BRACKETS.finditer(data):
+        if found[0] in b"[{":
+            depth += 1
+        elif found[0] in b"]}":
+            depth -= 1
+        if depth > _DEEPEST:
+            raise ValueError(f"nested more than {_DEEPEST} deep")
+
+
+def parse_json(data: bytes) -> Any:
+    """What a device sent as JSON; raises `ValueError` where it is none, or nested too deep."""
+    check_depth(data)
+    return json.loads(data)
 
 
 def printable(text: str) -> str:

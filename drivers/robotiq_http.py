@@ -12,6 +12,7 @@ from typing import Any
 from drivers.bounded_http import BoundedHttp, NoAnswer
 from drivers.errors import DeviceError, DeviceRefused, DeviceUnreachable, FrameMissing
 from drivers.jpeg import jpeg_size
+from drivers.outside import parse_json
 
 PORT = 4242
 MOST_PIXELS = 1 << 24
@@ -52,8 +53,8 @@ class RobotiqHttp:
         """The camera's settings by name, or None where this firmware does not report them."""
         try:
             body = self._request("GET", "/getcamerasettings", None, deadline_s)
-            settings = json.loads(body)["cameraSettings"]
-        except (DeviceError, ValueError, KeyError, TypeError, RecursionError) as error:
+            settings = parse_json(body)["cameraSettings"]
+        except (DeviceError, ValueError, KeyError, TypeError) as error:
             if isinstance(error, DeviceUnreachable):
                 raise
             return None

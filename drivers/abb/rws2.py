@@ -217,7 +217,7 @@ class Rws2:
 def _json(answer: Any) -> dict[str, Any]:
     try:
         reported = answer.json()
-    except (ValueError, RecursionError):
+    except ValueError:
         reported = None
     return reported if isinstance(reported, dict) else {}
 

@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 
 from drivers.abb.guard import bare_tls, plain, session_for
 from drivers.errors import DeviceRefused, DeviceUnreachable
+from drivers.outside import check_depth
 
 _HANDSHAKE_S = 1.0
 _HTTPS_PORT, _HTTP_PORT = 443, 80
@@ -137,7 +138,8 @@ def read_whole(response: Any, deadline_s: float) -> Any:
     Raises
     ------
     OSError
-        It is too large, or did not end before the deadline on the monotonic clock.
+        It is too large, or did not end before the deadline on the monotonic clock, or is JSON
+        nested too deep.
     """
     body = bytearray()
     for chunk in response.iter_content(_CHUNK_BYTES):
@@ -145,6 +147,12 @@ def read_whole(response: Any, deadline_s: float) -> Any:
         if len(body) > LARGEST_ANSWER_BYTES or time.monotonic() > deadline_s:
             response.close()
             raise OSError("an answer without an end")
+    whole = bytes(body)
+    if whole.lstrip().startswith((b"[", b"{")):
+        try:
+            check_depth(whole)
+        except ValueError as error:
+            raise OSError(f"an answer {error}") from None
     # the place where `requests` keeps a body that was read
-    response._content = bytes(body)  # noqa: SLF001
+    response._content = whole  # noqa: SLF001
     return response

@@ -15,7 +15,7 @@ from typing import Any
 
 from drivers.bounded_http import BoundedHttp, NoAnswer
 from drivers.errors import DeviceRefused, DeviceUnreachable
-from drivers.outside import printable
+from drivers.outside import parse_json, printable
 from drivers.ur.panel import StopOrder
 
 ROBOT_API_PORT = 80
@@ -142,7 +142,7 @@ class RobotApi:
                     f"answer ({error}). Check power, cable and address"
                 ) from None
         try:
-            reported = json.loads(answer) if answer else {}
-        except (ValueError, RecursionError):
+            reported = parse_json(answer) if answer else {}
+        except ValueError:
             reported = {}
         return status, reported if isinstance(reported, dict) else {}

@@ -15,6 +15,7 @@ from drivers.abb import FACTORY_LOGIN, ABBArm, ABBSettings, Login
 from drivers.abb.rws import open_rws
 from drivers.abb.transport import LARGEST_ANSWER_BYTES, certificate_of, resolved
 from drivers.errors import DeviceError, DeviceRefused
+from drivers.outside import parse_json
 from sim.peers.abb import ABBController
 from sim.peers.abb.answers import Answer
 from sim.peers.loopback import own_address
@@ -131,6 +132,19 @@ def test_an_answer_that_cannot_be_is_an_error_with_a_name(body):
             arm.connect()
         assert str(refused.value).isprintable()
         assert len(str(refused.value)) < 500
+
+
+@pytest.mark.parametrize(
+    "data", [b"[" * 10**6, b'{"a":' * 65 + b"1" + b"}" * 65, b'"\\' * 500_000 + b"[", b'"' * 10**6]
+)
+def test_json_that_no_device_nests_so_deep_is_refused_before_it_is_parsed(data):
+    with pytest.raises(ValueError, match=r"nested|delimiter|Extra data|escape"):
+        parse_json(data)
+
+
+def test_brackets_in_words_nest_nothing():
+    words = "[" * 100 + '"{'
+    assert parse_json(json.dumps({"a": [words, {"b": []}]}).encode()) == {"a": [words, {"b": []}]}
 
 
 def test_a_controller_that_points_elsewhere_is_not_followed():
