@@ -14,7 +14,7 @@ from calib.errors import CalibrationError
 from calib.paper.extrinsics import board_poses
 from calib.paper.zhang import centred_camera_matrix, zhang_algebraic, zhang_pinhole
 from calib.solver.free_poses import FreePoseFit, fit_free_poses
-from calib.solver.unknowns import PLAIN_OPTICS
+from calib.solver.unknowns import plain_optics
 from calib.views import BoolArray, FloatArray, Views
 
 FRAME_OUTLIER = 6.0
@@ -58,9 +58,9 @@ class Baseline:
         """Maximum likelihood with the skew at zero, as most other programs take it."""
         row = self.mle.optics[np.flatnonzero(self.used)[0]].copy()
         row[COLUMN["skew_px"]] = 0.0
-        poses = self.mle.camera_from_board
-        fit = fit_subset(views, self.used, row, poses, self.weight, PLAIN_OPTICS)
-        return as_solution(fit, self.weight, PLAIN_OPTICS)
+        poses, free = self.mle.camera_from_board, plain_optics(row)
+        fit = fit_subset(views, self.used, row, poses, self.weight, free)
+        return as_solution(fit, self.weight, free)
 
 
 def fit_baseline(views: Views, usable: Usable) -> Baseline:
@@ -73,10 +73,33 @@ def fit_baseline(views: Views, usable: Usable) -> Baseline:
     """
     missing: dict[str, str] = {}
     optics, poses = _start(views, usable, missing)
+    settled = settle(views, optics, poses, usable, VALUES)
+    used, weight = settled.used, settled.weight
+    algebraic = _algebraic(views, usable, used, weight, missing)
+    return replace(settled, algebraic=algebraic, missing=missing)
+
+
+def settle(
+    views: Views, optics: FloatArray, poses: FloatArray, usable: Usable, free: tuple[str, ...]
+) -> Baseline:
+    """Maximum likelihood from a start on, wrong frames and corners left out.
+
+    Parameters
+    ----------
+    optics, poses:
+        (K,) and (N, 4, 4) near enough for the iteration.
+    free:
+        Names of the columns to fit.
+
+    Raises
+    ------
+    CalibrationError
+        The views do not fix the camera.
+    """
     used, weight = usable.used.copy(), usable.good.astype(float)
     rejected: list[Rejection] = list(usable.rejected)
     for _ in range(_ROUNDS):
-        fit = fit_subset(views, used, optics, poses, weight, VALUES)
+        fit = fit_subset(views, used, optics, poses, weight, free)
         worse = _bad_frames(fit.residual_px, views, used)
         before, weight = weight, _corner_weight(fit, views, used)
         if not worse and np.array_equal(weight[used], before[used]):
@@ -84,11 +107,10 @@ def fit_baseline(views: Views, usable: Usable) -> Baseline:
         rejected += worse
         used = used & ~np.isin(views.frame, [r.frame for r in worse])
         require_frames(int(used.sum()), len(views))
-    fit = fit_subset(views, used, fit.optics[np.flatnonzero(used)[0]], poses, weight, VALUES)
+    fit = fit_subset(views, used, fit.optics[np.flatnonzero(used)[0]], poses, weight, free)
     _check(fit, views)
-    algebraic = _algebraic(views, usable, used, weight, missing)
-    mle = as_solution(fit, weight, VALUES)
-    return Baseline(algebraic, mle, used, weight, tuple(rejected), missing)
+    mle = as_solution(fit, weight, free)
+    return Baseline(None, mle, used, weight, tuple(rejected), {})
 
 
 def _start(views: Views, usable: Usable, missing: dict[str, str]) -> tuple[FloatArray, FloatArray]:
@@ -164,10 +186,15 @@ def as_solution(fit: FreePoseFit, weight: FloatArray, free: tuple[str, ...]) -> 
         optics=fit.optics,
         camera_from_board=fit.camera_from_board,
         residual_px=np.where(weight[..., None] > 0, fit.residual_px, np.nan),
-        values={name: float(first[COLUMN[name]]) for name in VALUES},
+        values={name: float(first[COLUMN[name]]) for name in (*VALUES, *further(free))},
         sigma={name: float(s) for name, s in zip(free, sigma, strict=True)},
         covariance=Covariance(free, fit.covariance),
     )
+
+
+def further(free: tuple[str, ...]) -> tuple[str, ...]:
+    """Those of the fitted columns that not every solution has."""
+    return tuple(name for name in free if name not in VALUES)
 
 
 def _bad_frames(residual_px: FloatArray, views: Views, used: BoolArray) -> list[Rejection]:

@@ -35,23 +35,32 @@ def usable_frames(views: Views) -> Usable:
     CalibrationError
         Fewer than three frames are left.
     """
+    wanted, rejected = worth_a_fit(views)
+    corners_px = np.where(wanted[:, None, None], views.corners_px, np.nan)
+    homographies, good, failed = robust_homographies(views.board.corners_m[:, :2], corners_px)
+    more = [Rejection(int(views.frame[i]), failed[i]) for i in failed if wanted[i]]
+    used: BoolArray = np.asarray(np.isfinite(homographies).all(axis=(1, 2)))
+    require_frames(int(used.sum()), len(views))
+    order = {int(frame): i for i, frame in enumerate(views.frame)}
+    return Usable(
+        homographies, used, good, tuple(sorted((*rejected, *more), key=lambda r: order[r.frame]))
+    )
+
+
+def worth_a_fit(views: Views) -> tuple[BoolArray, tuple[Rejection, ...]]:
+    """(N,) frames with corners enough that are no copy of another, and the others with why."""
     seen, first = views.seen.sum(axis=1), _first_of_copies(views)
     copy = first != np.arange(len(views))
-    few = (seen < CORNERS_NEEDED) | copy
-    corners_px = np.where(few[:, None, None], np.nan, views.corners_px)
-    homographies, good, failed = robust_homographies(views.board.corners_m[:, :2], corners_px)
-    failed |= {
+    why = {
         int(i): "no corners" if seen[i] == 0 else f"only {seen[i]} corners seen"
-        for i in np.flatnonzero(few)
+        for i in np.flatnonzero((seen < CORNERS_NEEDED) | copy)
     }
-    failed |= {
+    why |= {
         int(i): f"{COPY} {views.frame[first[i]]} to the last bit: counted once"
         for i in np.flatnonzero(copy)
     }
-    rejected = [Rejection(int(views.frame[i]), failed[i]) for i in sorted(failed)]
-    used: BoolArray = np.asarray(np.isfinite(homographies).all(axis=(1, 2)))
-    require_frames(int(used.sum()), len(views))
-    return Usable(homographies, used, good, tuple(rejected))
+    wanted = ~np.isin(np.arange(len(views)), list(why))
+    return wanted, tuple(Rejection(int(views.frame[i]), why[i]) for i in sorted(why))
 
 
 def _first_of_copies(views: Views) -> NDArray[np.int64]:

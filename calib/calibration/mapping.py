@@ -164,7 +164,12 @@ def _solution(calibration: Calibration, name: str) -> dict[str, Any]:
     solution: Solution = calibration.solutions[name]
     error = calibration.position_error.get(name)
     return {
+        "projection": solution.projection,
         **solution.values,
+        "domain": {
+            "invertible_angle_rad": solution.invertible_rad,
+            "supported_angle_rad": calibration.supported_rad[name],
+        },
         "at_distance_m": solution.at_distance_m,
         "focus": None if solution.focus is None else _focus(solution.focus),
         "sigma": dict(solution.sigma),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from calib.calibration.baseline import Baseline, fit_baseline, fit_subset
+from calib.calibration.baseline import Baseline, fit_subset
 from calib.calibration.cautions import cautions
 from calib.calibration.cross_validation import CrossValidation, cross_validate
-from calib.calibration.frames import usable_frames
 from calib.calibration.identifiability import Weakness, find_weaknesses
 from calib.calibration.joint_lens import FURTHER_NAMES
+from calib.calibration.lens_choice import NO_HOMOGRAPHY, chosen_lens
 from calib.calibration.paper_method import PaperResult, board_depth_m, run_paper_method
 from calib.calibration.result import VALUES, Calibration, PositionError, Solution
 from calib.calibration.robot import RobotFit, fit_robot, hand_eye_of
@@ -47,8 +47,7 @@ def calibrate(views: Views) -> Calibration:
         Not even Zhang's calibration is possible: fewer than three usable frames, or frames that
         do not fix the camera.
     """
-    usable = usable_frames(views)
-    baseline = fit_baseline(views, usable)
+    baseline, homographies = chosen_lens(views)
     solutions = {"zhang_mle": baseline.mle}
     if baseline.algebraic is not None:
         solutions["zhang_algebraic"] = baseline.algebraic
@@ -56,7 +55,7 @@ def calibrate(views: Views) -> Calibration:
     robot, fault = _robot(views, baseline, missing)
     paper = PaperResult((), None, None, None, {}, {})
     if robot is not None:
-        paper = _paper(views, baseline, usable.homographies, robot)
+        paper = _paper(views, baseline, homographies, robot)
         solutions |= paper.solutions
         missing |= paper.missing
         if robot.joint is not None:
@@ -82,6 +81,7 @@ def calibrate(views: Views) -> Calibration:
         missing=missing,
         image_size_px=(views.width_px, views.height_px),
         distance_range_m=span_m,
+        supported_rad={n: s.supported_rad(views.board.corners_m) for n, s in solutions.items()},
         weaknesses=_weaknesses(views, robot),
         uncertainty=_uncertainty(views, robot, span_m),
         cross_validation=cross_validation,
@@ -151,8 +151,10 @@ def _robot(
 
 
 def _paper(
-    views: Views, baseline: Baseline, homographies: FloatArray, robot: RobotFit
+    views: Views, baseline: Baseline, homographies: FloatArray | None, robot: RobotFit
 ) -> PaperResult:
+    if homographies is None:
+        return PaperResult((), None, None, None, {}, dict.fromkeys(_PAPER_RESULTS, NO_HOMOGRAPHY))
     try:
         return run_paper_method(
             views, baseline.used, baseline.weight, homographies, baseline.mle, robot.reference

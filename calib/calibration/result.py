@@ -12,6 +12,8 @@ from calib.calibration.caution import Caution
 from calib.calibration.cross_validation import CrossValidation
 from calib.calibration.identifiability import Weakness
 from calib.calibration.uncertainty import UncertaintyMap
+from calib.chain.optics import COLUMN
+from calib.chain.sight import invertible_rad, off_axis_rad
 from calib.handeye import HandEye, chain
 from calib.notebook import Row, Shown, axes_of
 from calib.paper.focus_law import FocusLaw, FocusLawChoice, Parameter
@@ -111,6 +113,27 @@ class Solution:
     covariance: Covariance | None = None
 
     @property
+    def wide(self) -> bool:
+        """Whether the image is an equidistant one, as wide lenses make it."""
+        return bool(np.nanmax(self.optics[:, COLUMN["equidistant"]]))
+
+    @property
+    def invertible_rad(self) -> float:
+        """Angle off the axis up to which every direction has a pixel of its own."""
+        return invertible_rad(self.optics[np.flatnonzero(np.isfinite(self.optics[:, 0]))[0]])
+
+    def supported_rad(self, board_m: FloatArray) -> float:
+        """Angle off the axis of the farthest corner that was used, of (M, 3) on the board."""
+        pose = self.camera_from_board
+        seen = off_axis_rad(board_m @ np.swapaxes(pose[:, :3, :3], 1, 2) + pose[:, None, :3, 3])
+        return float(seen[np.isfinite(self.residual_px).all(axis=2)].max())
+
+    @property
+    def projection(self) -> str:
+        """The ideal image's name in files."""
+        return "equidistant" if self.wide else "perspective"
+
+    @property
     def reprojection_px(self) -> dict[str, float]:
         """Signed mean, median and spread of the components (Table 1); rms per corner."""
         r = self.residual_px[np.isfinite(self.residual_px)]
@@ -205,6 +228,8 @@ class Calibration(Shown):
         (width, height).
     distance_range_m:
         Nearest and farthest depth of the board's centre in the frames used.
+    supported_rad:
+        Of every solution, the angle off the axis of the farthest corner used.
     weaknesses:
         What the views of the joint fit cannot separate, and which views would.
     uncertainty:
@@ -229,6 +254,7 @@ class Calibration(Shown):
     missing: Mapping[str, str]
     image_size_px: tuple[int, int]
     distance_range_m: tuple[float, float]
+    supported_rad: Mapping[str, float]
     weaknesses: tuple[Weakness, ...] = ()
     uncertainty: UncertaintyMap | None = None
     cross_validation: CrossValidation | None = None

@@ -22,7 +22,7 @@ from calib.errors import CalibrationError
 from calib.handeye import HandEye, solve_hand_eye
 from calib.solver.joint import JointFit, fit_joint
 from calib.solver.noise import Noise
-from calib.solver.unknowns import PLAIN_OPTICS, unknowns_of
+from calib.solver.unknowns import unknowns_of
 from calib.views import BoolArray, FloatArray, Views
 
 DECISIVE_AIC = 30.0
@@ -179,7 +179,7 @@ def _confirmed(still: JointFit, moving: JointFit, views: Views) -> bool:
 
 
 def _fit(model: CellModel, views: Views, noise: Noise) -> JointFit:
-    return fit_joint(model, views, unknowns_of(model, PLAIN_OPTICS), noise)
+    return fit_joint(model, views, unknowns_of(model), noise)
 
 
 def _arm_is_true(fit: JointFit) -> bool:

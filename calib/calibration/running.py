@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.calibration.baseline import fit_baseline
-from calib.calibration.frames import usable_frames
+from calib.calibration.lens_choice import chosen_baseline
 from calib.calibration.pipeline import robot_after
 from calib.calibration.uncertainty import focal_length_sigma_px, optics_at
 from calib.chain.effects import make_effect
@@ -21,7 +20,7 @@ from calib.chain.optics import COLUMN
 from calib.errors import CalibrationError
 from calib.handeye import chain
 from calib.solver.joint import JointFit, fit_joint
-from calib.solver.unknowns import PLAIN_OPTICS, unknowns_of
+from calib.solver.unknowns import unknowns_of
 from calib.views import BoolArray, FloatArray, Views
 
 _LAW = "inverse_square"
@@ -78,7 +77,7 @@ def fit_so_far(views: Views, *, lens_moves: bool) -> RunningFit:
     CalibrationError
         The frames do not fix camera and robot yet; the message says what is missing.
     """
-    baseline = fit_baseline(views, usable_frames(views))
+    baseline = chosen_baseline(views)
     robot = robot_after(views, baseline)
     joint = robot.joint
     if joint is None:
@@ -93,6 +92,6 @@ def _with_law(joint: JointFit, views: Views, taken: BoolArray, weight: FloatArra
     counted = replace(views, corners_px=corners).take(taken)
     model = joint.model.with_effects([make_effect("focus_breathing", {"law": _LAW})])
     try:
-        return fit_joint(model, counted, unknowns_of(model, PLAIN_OPTICS), joint.noise)
+        return fit_joint(model, counted, unknowns_of(model), joint.noise)
     except np.linalg.LinAlgError:
         raise CalibrationError("the frames leave open how the focal length moves") from None

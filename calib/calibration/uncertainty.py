@@ -19,11 +19,13 @@ from calib.chain import rigid
 from calib.chain.model import CellModel, evaluate, predict
 from calib.chain.optics import COLUMN
 from calib.chain.projection import project_with_jacobians
+from calib.chain.sight import unproject
 from calib.solver.unknowns import Unknown, moved
 from calib.views import Board, BoolArray, FloatArray, Views
 
 _COLUMNS, _ROWS, _DISTANCES = 5, 3, 4
 _EDGE = 0.1
+_SHRINK, _SHRINKS = 0.9, 20
 _PART_OF_IMAGE = 0.2
 _STEP_SIGMA = 0.1
 
@@ -80,7 +82,7 @@ def uncertainty_map(
     distance_range_m:
         Nearest and farthest depth.
     """
-    pixels, distances = grid_px(views), grid_m(distance_range_m)
+    pixels, distances = grid_px(views, joint.model), grid_m(distance_range_m)
     return UncertaintyMap(
         distances,
         pixels,
@@ -90,11 +92,17 @@ def uncertainty_map(
     )
 
 
-def grid_px(views: Views) -> FloatArray:
-    """(G, 2) places all over the image."""
+def grid_px(views: Views, model: CellModel) -> FloatArray:
+    """(G, 2) places all over the image, or over the part of it that has lines of sight."""
     u = np.linspace(_EDGE, 1 - _EDGE, _COLUMNS) * views.width_px
     v = np.linspace(_EDGE, 1 - _EDGE, _ROWS) * views.height_px
-    return np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    pixels = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    middle = pixels.mean(axis=0)
+    for _ in range(_SHRINKS):
+        if np.isfinite(unproject(model.optics, pixels)).all():
+            break
+        pixels = middle + _SHRINK * (pixels - middle)
+    return pixels
 
 
 def grid_m(distance_range_m: tuple[float, float]) -> FloatArray:
@@ -153,7 +161,8 @@ def workpiece_sigma_m(
 ) -> FloatArray:
     """How far off a part may be for the robot that one perfect picture locates.
 
-    The part lies square to the optical axis and is found by least squares in pixels; then the
+    The part lies square to the optical axis (with a wide lens to the line of sight, its distance
+    along that) and is found by least squares in pixels; then the
     camera's place brings it to the robot.
 
     Parameters
@@ -201,6 +210,9 @@ def _shown(
 ) -> Views:
     """Views of the part, one with its middle at each pixel."""
     optics, eye = optics_at(joint.model, views, distance_m)[None], np.eye(4)[None]
+    if optics[0, COLUMN["equidistant"]]:
+        poses = _facing(part, unproject(optics[0], pixels_px), distance_m)
+        return views_that_see(joint.model, views, part, poses, distance_m)
     points = np.column_stack([np.zeros_like(pixels_px), np.full(len(pixels_px), distance_m)])
     for _ in range(20):
         uv, by_pose, _ = project_with_jacobians(optics, eye, points)
@@ -217,6 +229,16 @@ def _shown_at(
     for d in distance_m:
         part, _ = _part(joint, views, float(d))
         yield _shown(joint, views, part, pixels_px, float(d))
+
+
+def _facing(part: Board, sight: FloatArray, distance_m: float) -> FloatArray:
+    """(G, 4, 4) of the part's middle at a distance along (G, 3) lines of sight, square to them."""
+    aside = np.linalg.norm(sight[:, :2], axis=1)
+    axis = np.column_stack([-sight[:, 1], sight[:, 0], np.zeros(len(sight))])
+    angle = np.arctan2(aside, sight[:, 2])
+    turned = rigid.compose(axis * (angle / np.maximum(aside, 1e-12))[:, None], np.zeros_like(sight))
+    turned[:, :3, 3] = distance_m * sight - turned[:, :3, :3] @ part.corners_m.mean(axis=0)
+    return turned
 
 
 def _change_of_pixels(joint: Estimate, shown: Views) -> FloatArray:

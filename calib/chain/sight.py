@@ -45,7 +45,8 @@ def invertible_rad(optics: FloatArray) -> float:
     """
     angle = np.linspace(0.0, _widest_rad(optics), _STEPS)
     for _ in range(3):  # each time between the two steps where it folds
-        grows = np.diff(distorted_radius(optics, angle)) > 0
+        with np.errstate(invalid="ignore"):  # beyond a pole
+            grows = np.diff(distorted_radius(optics, angle)) > 0
         if grows.all():
             return float(angle[-1])
         fold = int((~grows).argmax())

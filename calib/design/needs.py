@@ -65,7 +65,8 @@ def needs_of(
     stands still), metres and radians an axis.
     """
     p = len(estimate.unknowns)
-    pixels = projection_change_px(estimate, views, grid_px(views), grid_m(distance_range_m))
+    grid = grid_px(views, estimate.model)
+    pixels = projection_change_px(estimate, views, grid, grid_m(distance_range_m))
     distances = np.linspace(*distance_range_m, ALPHA_DISTANCES)
     camera = "flange_from_mounted" if views.mount == "eye_in_hand" else "base_from_fixed"
     at = [k for k, u in enumerate(estimate.unknowns) if u.name.startswith(f"{camera}.")]

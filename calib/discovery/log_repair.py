@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.calibration.baseline import Baseline, fit_baseline
-from calib.calibration.frames import usable_frames
+from calib.calibration.baseline import Baseline
+from calib.calibration.lens_choice import chosen_baseline
 from calib.calibration.result import Rejection
 from calib.chain import rigid
 from calib.chain.effect import Present
@@ -172,7 +172,7 @@ def _calibrated(repair: _Log) -> Baseline:
     """The pictures' calibration, as if a change of the camera midway had not been."""
     baseline: Baseline | CalibrationError
     try:
-        baseline = fit_baseline(repair.views, usable_frames(repair.views))
+        baseline = chosen_baseline(repair.views)
     except CalibrationError as error:
         baseline = error
     found = baseline if isinstance(baseline, Baseline) else None
@@ -183,7 +183,7 @@ def _calibrated(repair: _Log) -> Baseline:
         return baseline
     repair.known = (changed.step,)
     alike = as_before(repair.views, changed)
-    return fit_baseline(alike, usable_frames(alike))
+    return chosen_baseline(alike)
 
 
 def _without_pose(views: Views, dropped: Sequence[int]) -> list[Rejection]:

@@ -24,6 +24,11 @@ PLAIN_OPTICS = ("alpha_px", "beta_px", "u0_px", "v0_px", "k1", "k2")
 """What the plain model frees: one focal length a side, principal point, two radial terms."""
 
 
+def plain_optics(optics: FloatArray) -> tuple[str, ...]:
+    """What the plain model of (K,) optics frees: a wide lens has four radial terms."""
+    return (*PLAIN_OPTICS, "k3", "k4") if optics[COLUMN["equidistant"]] else PLAIN_OPTICS
+
+
 PRIOR_WIDTH = 10.0
 """An effect's amount has a normal prior this many times its usual size wide.
 
@@ -68,9 +73,13 @@ def _free_of(present: Present, at: int) -> list[Unknown]:
 
 
 def unknowns_of(
-    model: CellModel, optics: tuple[str, ...] = PLAIN_OPTICS, *, poses: bool = True
+    model: CellModel, optics: tuple[str, ...] | None = None, *, poses: bool = True
 ) -> tuple[Unknown, ...]:
-    """Every free number of a cell: optics columns, the two transforms, its effects."""
+    """Every free number of a cell: optics columns, the two transforms, its effects.
+
+    The columns are `plain_optics` where none are given.
+    """
+    optics = plain_optics(model.optics) if optics is None else optics
     free = [Unknown(c, "", _OPTICS_TYPICAL.get(c, 0.01), ("optics", COLUMN[c], 0)) for c in optics]
     if poses:
         for frame in ("flange_from_mounted", "base_from_fixed"):

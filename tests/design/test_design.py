@@ -69,7 +69,8 @@ def test_the_needs_are_what_the_report_will_show(mount: str) -> None:
         need.name: np.sqrt(np.sum(need.weight * expected.covariance))
         for need in needs_of(expected, shown, (0.35, 0.8))
     }
-    pixels = projection_sigma_px(expected, shown, grid_px(shown), grid_m((0.35, 0.8)))
+    grid = grid_px(shown, expected.model)
+    pixels = projection_sigma_px(expected, shown, grid, grid_m((0.35, 0.8)))
     assert sigma["projection"] == pytest.approx(np.sqrt((pixels**2).mean()), rel=1e-6)
     alpha = focal_length_sigma_px(expected, shown, np.linspace(0.35, 0.8, 9))
     assert sigma["alpha"] == pytest.approx(np.sqrt((alpha**2).mean()), rel=1e-6)

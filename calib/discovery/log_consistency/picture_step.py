@@ -48,8 +48,11 @@ def find_picture_step(views: Views, baseline: Baseline | None) -> PictureStep | 
     ----------
     views, baseline:
         The recording's frames, and the calibration of all of them; None where no one camera shows
-        them.
+        them. Homographies say what the pictures' own noise is; a wide lens has none, and its steps
+        are left to the search.
     """
+    if baseline is not None and baseline.mle.wide:
+        return None
     floor = _homographies_mean_square(views)
     single = _costs(views, baseline, floor)
     left_out = 1.0 if baseline is None else 1.0 - baseline.used.mean()

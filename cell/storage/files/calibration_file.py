@@ -135,6 +135,15 @@ class CovariancePart(ResultPart):
     matrix: tuple[tuple[float, ...], ...]
 
 
+class DomainPart(ResultPart):
+    """Where a camera may be asked: angles off its axis."""
+
+    invertible_angle_rad: PositiveFloat
+    """Up to here every direction has a pixel of its own; beyond, the distortion folds."""
+    supported_angle_rad: PositiveFloat
+    """Up to here corners were used: beyond, the distortion is an extrapolation."""
+
+
 class SolutionPart(ResultPart, CameraNumbers):
     """One camera model."""
 
@@ -142,6 +151,7 @@ class SolutionPart(ResultPart, CameraNumbers):
     skew_px: float
     k1: float
     k2: float
+    domain: DomainPart | None = None
     at_distance_m: float | None
     """Where alpha and beta move with distance: the distance they are given at."""
     focus: FocusPart | None = None

@@ -90,6 +90,11 @@ class SolutionSource(CameraNumbers, _Part):
     covariance: CovarianceSource | None = None
 
     @property
+    def wide(self) -> bool:
+        """Whether the image is an equidistant one."""
+        return self.projection == "equidistant"
+
+    @property
     def distortion(self) -> tuple[float, ...]:
         """The fourteen coefficients of `DISTORTION`."""
         return tuple(float(getattr(self, name)) for name in DISTORTION)

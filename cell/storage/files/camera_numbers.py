@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import BaseModel, ConfigDict, PositiveFloat
 
 
 class CameraNumbers(BaseModel):
-    """Scale factors, principal point, skew and distortion in OpenCV's model."""
+    """Scale factors, principal point, skew and distortion in OpenCV's model of that projection."""
 
     model_config = ConfigDict(frozen=True, use_attribute_docstrings=True, allow_inf_nan=False)
 
+    projection: Literal["perspective", "equidistant"] = "perspective"
+    """How the image grows from its middle: with the tangent of the angle off the axis, or with the
+    angle (a wide lens). Of the latter k1 to k4 are Kannala and Brandt's, OpenCV's `fisheye`."""
     alpha_px: PositiveFloat
     beta_px: PositiveFloat
     u0_px: float

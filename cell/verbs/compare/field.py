@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from calib.chain.rigid import from_vector
+from calib.chain.sight import unproject
 from calib.views import FloatArray
 from cell.errors import InputError
 from cell.verbs.compare.side import PLACE, Side
@@ -59,21 +59,17 @@ def field_of(a: Side, b: Side) -> Field:
     v = np.linspace(_EDGE, 1 - _EDGE, _ROWS) * height
     pixels = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
     points = np.array([_rays(a, pixels, float(d)) * d for d in distances])
-    return Field(distances, pixels, points)
+    seen = np.isfinite(points).all(axis=(0, 2))
+    return Field(distances, pixels[seen], np.ascontiguousarray(points[:, seen]))
 
 
 def _rays(side: Side, pixels: FloatArray, distance_m: float) -> FloatArray:
-    """(G, 3) directions with z = 1 that the camera sees at these pixels."""
-    alpha, beta = side.scale_px(side.values, distance_m)
-    u0, v0, skew, *fitted = side.values[3 : PLACE.start]
-    y = (pixels[:, 1] - v0) / beta
-    x = (pixels[:, 0] - u0 - skew * y) / alpha
-    coefficients = np.array(fitted)
-    enough = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-14)
-    ideal = cv2.undistortPointsIter(
-        np.stack([x, y], axis=1)[:, None], np.eye(3), coefficients, np.eye(3), np.eye(3), enough
-    )
-    return np.column_stack([ideal[:, 0], np.ones(len(pixels))])
+    """(G, 3) directions that the camera sees at these pixels, NaN where none is.
+
+    With z = 1 for a perspective image, of unit length for a wide one.
+    """
+    sight = unproject(side.optics(side.values, distance_m), pixels)
+    return sight if side.wide else np.asarray(sight / sight[:, 2:])
 
 
 def differences(

@@ -47,6 +47,8 @@ class Side:
     ----------
     label, recording, solution:
         What it is called, for the reader.
+    wide:
+        Whether its image is an equidistant one.
     law:
         Of the focal length: a name of `calib.paper.focus_law.LAWS`.
     values, covariance:
@@ -66,6 +68,7 @@ class Side:
     label: str
     recording: str
     solution: str
+    wide: bool
     image_size_px: tuple[int, int]
     range_m: tuple[float, float]
     law: str
@@ -94,7 +97,7 @@ class Side:
         """(K,) of the camera focused at a distance."""
         alpha, beta = self.scale_px(values, distance_m)
         named = dict(zip(OPTICS_NAMES[3:], values[3 : PLACE.start], strict=True))
-        return optics_row(alpha_px=alpha, beta_px=beta, **named)
+        return optics_row(alpha_px=alpha, beta_px=beta, **named, equidistant=float(self.wide))
 
     def pixels(
         self, values: FloatArray, points_m: FloatArray, distance_m: float, place: FloatArray
@@ -134,6 +137,7 @@ def side_of(calibration: CalibrationSource, label: str) -> Side:
         label=label,
         recording=calibration.recording,
         solution=name,
+        wide=solution.wide,
         image_size_px=calibration.image_size_px,
         range_m=calibration.range_m,
         law="constant" if law is None else law.law,

@@ -10,10 +10,15 @@ from calib.views import FloatArray
 from cell.errors import InputError
 from cell.storage.files.calibration_source import DISTORTION
 
+FISHEYE = ("k1", "k2", "k3", "k4")
+"""Kannala and Brandt's terms, in the order of every tool that has them."""
+
 
 @dataclass(frozen=True)
 class Camera:
     """A camera after the paper's Eq. 2 with distortion in OpenCV's terms.
+
+    With `wide` the image is equidistant, and k1 to k4 are those of OpenCV's `fisheye`.
 
     Attributes
     ----------
@@ -34,6 +39,7 @@ class Camera:
     v0_px: float
     distortion: tuple[float, ...]
     about: str
+    wide: bool = False
 
     @property
     def optics(self) -> FloatArray:
@@ -44,6 +50,7 @@ class Camera:
             u0_px=self.u0_px,
             v0_px=self.v0_px,
             **dict(zip(DISTORTION, self.distortion, strict=True)),
+            equidistant=float(self.wide),
         )
 
     def size_px(self, tool: str) -> tuple[int, int]:
@@ -56,7 +63,10 @@ class Camera:
         return self.image_size_px
 
     def enough(self, lengths: Sequence[int]) -> int | None:
-        """The shortest of these lengths that leaves out no coefficient, or None."""
+        """The shortest of these lengths that leaves out no coefficient, or None.
+
+        Of a perspective image; an equidistant one has none of them, see `exact`.
+        """
         return next((n for n in lengths if not any(self.distortion[n:])), None)
 
     def coefficients(self, lengths: Sequence[int], tool: str) -> tuple[float, ...]:
@@ -65,8 +75,13 @@ class Camera:
         Raises
         ------
         InputError
-            One that is not zero would be left out.
+            One that is not zero would be left out, or the image is not a perspective one.
         """
+        if self.wide:
+            raise InputError(
+                f"{tool} has no equidistant image, which this wide lens makes. Export to another"
+                " format, such as opencv, ros, kalibr or colmap, or take the best fit: --refit"
+            )
         length = self.enough(lengths)
         if length is not None:
             return self.distortion[:length]
@@ -76,3 +91,20 @@ class Camera:
             f" {', '.join(DISTORTION[: max(lengths)])}. Export to another format, such as opencv,"
             " or take the best fit with those: --refit"
         )
+
+    @property
+    def is_kannala_brandt(self) -> bool:
+        """Whether a wide lens has no coefficients but Kannala and Brandt's four."""
+        others = (v for n, v in zip(DISTORTION, self.distortion, strict=True) if n not in FISHEYE)
+        return self.wide and not any(others)
+
+    def fisheye_coefficients(self, tool: str) -> tuple[float, ...]:
+        """k1 to k4 of a wide lens; raises `InputError` where it has others that are not zero."""
+        named = dict(zip(DISTORTION, self.distortion, strict=True))
+        if not self.is_kannala_brandt:
+            left = next(n for n, v in named.items() if v and n not in FISHEYE)
+            raise InputError(
+                f"{tool} cannot say the distortion coefficient {left} of a wide lens: it takes"
+                f" {', '.join(FISHEYE)}. Take the best fit with those: --refit"
+            )
+        return tuple(named[name] for name in FISHEYE)

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.chain.sight import distorted_radius, invertible_rad
 from cell.verbs.export.camera import Camera
-
-_WIDEST_RAD = np.radians(85.0)
-_STEPS = 5000
 
 
 @dataclass(frozen=True)
@@ -47,25 +45,15 @@ class Domain:
 def domain_of(camera: Camera) -> Domain | None:
     """Where the radial distortion folds inside the picture, or None where it does not.
 
-    Radius r of the undistorted point to r (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶)
-    must grow with r up to the farthest corner; the small other terms are not looked at.
+    The distance from the principal point must grow with the angle off the axis up to the farthest
+    corner; the small other terms are not looked at.
     """
     if camera.image_size_px is None:
         return None
-    k1, k2, _, _, k3, k4, k5, k6, *_ = camera.distortion
-    angle = np.linspace(0.0, _WIDEST_RAD, _STEPS)
-    r = np.tan(angle)
-    above = np.polynomial.polynomial.polyval(r**2, (1.0, k1, k2, k3))
-    below = np.polynomial.polynomial.polyval(r**2, (1.0, k4, k5, k6))
-    with np.errstate(divide="ignore"):
-        distorted = r * above / below
-    ends = (np.diff(distorted) <= 0) | (below[1:] <= 0)
+    angle = invertible_rad(camera.optics)
+    fold = float(distorted_radius(camera.optics, np.array([angle]))[0])
     farthest = _farthest_corner(camera)
-    fold = int(ends.argmax())
-    if not ends.any() or distorted[fold] >= farthest:
-        return None
-    share = float(distorted[fold]) / farthest
-    return Domain(float(distorted[fold]) * camera.alpha_px, float(angle[fold]), share)
+    return None if fold >= farthest else Domain(fold * camera.alpha_px, angle, fold / farthest)
 
 
 def _farthest_corner(camera: Camera) -> float:

@@ -36,6 +36,8 @@ LENGTHS: dict[str, tuple[int, ...]] = {
     "colmap": colmap.LENGTHS,
 }
 """How many coefficients of `DISTORTION` each of them takes."""
+FISHEYE_TOOLS = ("ros", "opencv", "kalibr", "colmap")
+"""Those that have a wide lens of Kannala and Brandt's four terms."""
 POSES: dict[str, Callable[[Sequence[Placement]], str]] = {
     "tf": tf.text,
     "moveit": tf.launch_file,
@@ -137,12 +139,14 @@ def export_calibration(
 def _sayable(camera: Camera, tool: str, *, refit: bool) -> tuple[Camera, tuple[str, ...]]:
     """The camera, refitted where that is asked for and needed, with what its reader must know."""
     notes: list[str] = []
-    if refit and camera.enough(LENGTHS[tool]) is not None:
+    wide = camera.wide and tool in FISHEYE_TOOLS
+    exact = camera.is_kannala_brandt if wide else camera.enough(LENGTHS[tool]) is not None
+    if refit and exact and wide == camera.wide:
         notes.append(f"nothing to refit: {tool} says this camera exactly")
     elif refit:
         from cell.verbs.export.refit import refit as fitted  # the solver takes a while to load
 
-        found = fitted(camera, LENGTHS[tool])
+        found = fitted(camera, LENGTHS[tool], wide=wide)
         camera = replace(found.camera, about=f"{camera.about}; {found.description}")
         notes.append(found.description)
     domain = domain_of(camera)
@@ -173,6 +177,7 @@ def _camera(
         v0_px=found.v0_px,
         distortion=found.distortion,
         about=f"calibration of recording {recording}, solution {name}; holds {at}",
+        wide=found.wide,
     )
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from calib.chain.projection import project
+from calib.chain.sight import distorted_radius, invertible_rad
 from calib.views import FloatArray
 from cell.storage.files.calibration_source import DISTORTION
-from cell.verbs.export.camera import Camera
+from cell.verbs.export.camera import FISHEYE, Camera
 
 _DIRECTIONS, _RADII, _STEPS = 48, 24, 400
 _WIDEST_RAD = np.radians(85.0)
@@ -35,7 +37,7 @@ class Refit:
         )
 
 
-def refit(camera: Camera, lengths: tuple[int, ...]) -> Refit:
+def refit(camera: Camera, lengths: tuple[int, ...], *, wide: bool = False) -> Refit:
     """Fit focal lengths, principal point and coefficients of a tool's model to a camera.
 
     Parameters
@@ -44,11 +46,16 @@ def refit(camera: Camera, lengths: tuple[int, ...]) -> Refit:
         The exact one; its picture's size must be known.
     lengths:
         How many coefficients of `DISTORTION` the tool takes.
+    wide:
+        Fit an equidistant image with its four terms instead.
     """
     rays, pixels, weight = field(camera)
+    if wide:
+        return _fitted(camera, FISHEYE, rays, pixels, weight)
+    start = _as_perspective(camera) if camera.wide else camera
     best: Refit | None = None
     for length in sorted(lengths):
-        found = _fitted(camera, length, rays, pixels, weight)
+        found = _fitted(start, DISTORTION[:length], rays, pixels, weight)
         if best is None or found.rms_px < best.rms_px:
             best = found
         if best.worst_px < _EXACT_PX:
@@ -57,15 +64,41 @@ def refit(camera: Camera, lengths: tuple[int, ...]) -> Refit:
     return best
 
 
+_RATIONAL = ("k1", "k2", "k3", "k4", "k5", "k6")
+_REWEIGHTED = 10
+
+
+def _as_perspective(camera: Camera) -> Camera:
+    """Near a wide camera, in the rational model's terms: where the fit begins.
+
+    The numerator less the radius times the denominator is linear in the coefficients; divided by
+    the denominator found before, it is the miss (Sanathanan and Koerner 1963).
+    """
+    angle = np.linspace(0.0, min(_WIDEST_RAD, invertible_rad(camera.optics)), _STEPS)[1:]
+    r, seen = np.tan(angle), distorted_radius(camera.optics, angle)
+    powers = np.stack([r**2, r**4, r**6], axis=1)
+    rows = np.concatenate([r[:, None] * powers, -seen[:, None] * powers], axis=1)
+    below, found = np.ones_like(r), np.zeros(len(_RATIONAL))
+    for _ in range(_REWEIGHTED):
+        scaled = rows / below[:, None]
+        size = np.linalg.norm(scaled, axis=0)
+        found = np.linalg.lstsq(scaled / size, (seen - r) / below, rcond=None)[0] / size
+        below = np.abs(1.0 + powers @ found[3:])
+    named = dict(zip(_RATIONAL, found.tolist(), strict=True))
+    return replace(camera, wide=False, distortion=tuple(named.get(n, 0.0) for n in DISTORTION))
+
+
 def _fitted(
-    camera: Camera, length: int, rays: FloatArray, pixels: FloatArray, weight: FloatArray
+    camera: Camera, names: Sequence[str], rays: FloatArray, pixels: FloatArray, weight: FloatArray
 ) -> Refit:
+    first = dict(zip(DISTORTION, camera.distortion, strict=True))
+
     def with_numbers(x: FloatArray) -> Camera:
-        tail = (0.0,) * (len(DISTORTION) - length)
         alpha, beta, u0, v0 = (float(value) for value in x[:4])
+        found = dict(zip(names, (float(value) for value in x[4:]), strict=True))
         return replace(
             camera, alpha_px=alpha, beta_px=beta, u0_px=u0, v0_px=v0,
-            distortion=(*(float(value) for value in x[4:]), *tail),
+            distortion=tuple(found.get(name, 0.0) for name in DISTORTION),
         )  # fmt: skip
 
     def off(x: FloatArray) -> FloatArray:
@@ -75,7 +108,7 @@ def _fitted(
         return np.asarray((weight[:, None] * off(x)).ravel())
 
     start = np.array([camera.alpha_px, camera.beta_px, camera.u0_px, camera.v0_px,
-                      *camera.distortion[:length]])  # fmt: skip
+                      *(first[name] for name in names)])  # fmt: skip
     found = least_squares(weighted, start, x_scale="jac", method="lm", xtol=1e-12, ftol=1e-12)
     length_px = np.linalg.norm(off(found.x), axis=1)
     rms = np.sqrt(np.average(length_px**2, weights=weight**2))
@@ -91,11 +124,9 @@ def field(camera: Camera) -> tuple[FloatArray, FloatArray, FloatArray]:
     width, height = camera.size_px("a refit")
     around = np.linspace(0.0, 2 * np.pi, _DIRECTIONS, endpoint=False)
     toward = np.stack([np.cos(around), np.sin(around)], axis=1)
-    r = np.tan(np.linspace(0.0, _WIDEST_RAD, _STEPS))
-    rays = np.concatenate(
-        [r[None, :, None] * toward[:, None], np.ones((len(toward), len(r), 1))], 2
-    )
-    pixels = _seen(camera, rays.reshape(-1, 3)).reshape(len(toward), len(r), 2)
+    angle = np.linspace(0.0, min(_WIDEST_RAD, invertible_rad(camera.optics)), _STEPS)
+    rays = _toward(toward[:, None], angle[None, :, None])
+    pixels = _seen(camera, rays.reshape(-1, 3)).reshape(len(toward), _STEPS, 2)
     radius = np.linalg.norm(pixels - [camera.u0_px, camera.v0_px], axis=2)
     on_picture = (pixels >= -0.5) & (pixels <= [width - 0.5, height - 0.5])
     inside = np.asarray(np.all(on_picture, axis=2))
@@ -103,12 +134,18 @@ def field(camera: Camera) -> tuple[FloatArray, FloatArray, FloatArray]:
     for direction, out, within in zip(toward, radius, inside, strict=True):
         grows = np.append(np.diff(out) > 0, False) & within
         last = max(int((~grows).argmax()), 1)
-        at = np.interp(np.linspace(0.0, out[last - 1], _RADII + 1)[1:], out[:last], r[:last])
-        chosen.append(np.column_stack([at[:, None] * direction, np.ones(_RADII)]))
+        at = np.interp(np.linspace(0.0, out[last - 1], _RADII + 1)[1:], out[:last], angle[:last])
+        chosen.append(_toward(direction, at[:, None]))
     kept = np.concatenate(chosen)
     seen = _seen(camera, kept)
     weight = np.sqrt(np.linalg.norm(seen - [camera.u0_px, camera.v0_px], axis=1))
     return kept, seen, np.asarray(weight / weight.max())
+
+
+def _toward(direction: FloatArray, angle_rad: FloatArray) -> FloatArray:
+    """(..., 3) unit vectors that far off the axis in (..., 2) directions around it."""
+    along = np.cos(angle_rad) + 0.0 * direction[..., :1]
+    return np.concatenate([np.sin(angle_rad) * direction, along], axis=-1)
 
 
 def _seen(camera: Camera, rays: FloatArray) -> FloatArray:

@@ -67,7 +67,7 @@ def expected_from(plan: Plan) -> ExpectedUncertainty:
     joints = guard.check_plan(plan, home)
     views = given.views(list(guard.kinematics.forward(np.array(joints))))
     expected = expect(given.model, given.lens, views, given.noise)
-    distances, pixels = grid_m(layout.distances_m), grid_px(views)
+    distances, pixels = grid_m(layout.distances_m), grid_px(views, given.model)
     camera = "flange_from_mounted" if views.mount == "eye_in_hand" else "base_from_fixed"
     return ExpectedUncertainty(
         distance_m=distances,

@@ -122,6 +122,7 @@ def _optics(found: SolutionSource) -> FloatArray:
     named = {"u0_px": found.u0_px, "v0_px": found.v0_px, "skew_px": found.skew_px}
     named |= dict(zip(DISTORTION, found.distortion, strict=True))
     named |= {"alpha_px": found.alpha_px, "beta_px": found.beta_px}
+    named["equidistant"] = float(found.wide)
     if found.focus is not None:
         reported = found.focus.parameters
         named |= {_FAR[name]: p.value for name, p in reported.items() if name in _FAR}

@@ -29,6 +29,7 @@ def json_text(calibration: CalibrationSource, name: str, distance_m: float | Non
         "solution": name,
         "pixel_origin": "centre of the top-left pixel",
         "image_size_px": calibration.image_size_px,
+        "projection": solution.projection,
         "alpha_px": alpha,
         "beta_px": beta,
         "u0_px": solution.u0_px,

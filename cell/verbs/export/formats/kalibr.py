@@ -1,4 +1,4 @@
-"""Kalibr: a camchain with one camera, pinhole with radial-tangential distortion."""
+"""Kalibr: a camchain with one camera, pinhole with radial-tangential or equidistant distortion."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ def text(camera: Camera) -> str:
     """A `camchain.yaml`: intrinsics fu, fv, pu, pv, and k1, k2, r1, r2.
 
     Kalibr's radtan has four coefficients: a third radial term is refused, not dropped. Pixel
-    coordinates are OpenCV's.
+    coordinates are OpenCV's. A wide lens is Kalibr's pinhole-equi, with k1 to k4.
     """
-    d = camera.coefficients(LENGTHS, "kalibr")
+    wide = camera.wide
+    d = camera.fisheye_coefficients("kalibr") if wide else camera.coefficients(LENGTHS, "kalibr")
     width, height = camera.size_px("kalibr")
     intrinsics = (camera.alpha_px, camera.beta_px, camera.u0_px, camera.v0_px)
     return (
@@ -22,7 +23,7 @@ def text(camera: Camera) -> str:
         "  cam_overlaps: []\n"
         "  camera_model: pinhole\n"
         f"  distortion_coeffs: {_list(d)}\n"
-        "  distortion_model: radtan\n"
+        f"  distortion_model: {'equidistant' if wide else 'radtan'}\n"
         f"  intrinsics: {_list(intrinsics)}\n"
         f"  resolution: [{width}, {height}]\n"
         "  rostopic: /camera/image_raw\n"
