@@ -22,7 +22,7 @@ class Fault:
     """One way to spoil a log.
 
     `spoil` gives where it starts, None for the whole run. `names` are right in `effects`, none of
-    them where frames must be left out and nothing else be told. With `stays` the cell is another
+    them where frames must be left out and nothing else found. With `stays` the cell is another
     one from that frame on, for frames to be predicted, too; else rows of the recording are spoilt.
     With `knocks` the base stands elsewhere from then on (usual sizes, m and rad).
     """

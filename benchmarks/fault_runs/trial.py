@@ -181,7 +181,7 @@ def _judge(fault: Fault, came: Trial) -> None:
         came.demand(came.halted_s <= fault.halt_s, late)
     last = "\n".join(came.output.splitlines()[-4:])
     for pattern in patterns:
-        came.demand(re.search(pattern, last) is not None, f"the operator is not told '{pattern}'")
+        came.demand(re.search(pattern, last) is not None, f"operator does not see '{pattern}'")
 
 
 def _judge_recording(stand: Stand, folder: Path, before: list[bytes], came: Trial) -> None:

@@ -119,7 +119,7 @@ class WatchedArm:
         if newest is None or newest.joints_rad is None or goal is None:
             return -1.0
         if isinstance(fault, ArmStopped) and newest.joint_velocity_rad_s is None:
-            return -1.0  # it stopped by itself, maybe before that reading, which tells no speed
+            return -1.0  # it stopped by itself, maybe before that reading, which has no speed
         speed_rad_s = self._speed_rad_s(newest)
         left_rad = float(np.abs(np.subtract(newest.joints_rad, goal)).max())
         if not (speed_rad_s > _UNDERWAY_RAD_S and left_rad > ARRIVING_RAD):
@@ -239,7 +239,7 @@ class WatchedArm:
 
         Returns
         -------
-        What the operator must be told of one that moved again, and the word of the stop that it
+        What the operator must read of one that moved again, and the word of the stop that it
         was then given; None where it stood, or nothing can be read any more.
         """
         until_s = self.clock.now() + STAND_BY_S
@@ -258,7 +258,7 @@ class WatchedArm:
 
 
 def _shouted(word: StopReport, because: str) -> StopFailed:
-    """What the operator must be told first, said at once."""
+    """What the operator must read first, shown at once."""
     with suppress(OSError):  # a terminal that is gone must not hide the rest
         sys.stderr.write(f"\a\n*** {word.text} ***\n")
         sys.stderr.flush()

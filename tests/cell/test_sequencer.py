@@ -263,7 +263,7 @@ def test_a_failing_stop_is_the_loudest_error(
 def test_an_arm_that_had_stopped_by_itself_by_its_newest_reading_is_known_to_stand(
     bench: Bench,
 ) -> None:
-    """Of a controller that tells no speeds: what came next is what it was, and yet not old."""
+    """Of a controller that reports no speeds: what came next is what it was, and yet not old."""
     state = bench.arm.state
 
     def without_speeds() -> ArmState:

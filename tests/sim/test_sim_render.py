@@ -260,7 +260,7 @@ def test_unknown_dictionary_is_named():
 
 
 def test_a_wide_lens_shows_the_board_where_the_chain_says_to_its_rim():
-    """Corners to 80 degrees off the axis: of a square's four sides the grey tells the place."""
+    """Corners to 80 degrees off the axis: of a square's four sides the grey gives the place."""
     optics = camera(640, 480, 175.0, equidistant=1.0, k1=0.02, k2=-0.004, beta_px=176.0)
     points = CHESS.corners_m
     tilted = pose([0.0, np.radians(60.0), 0.0], [0.160, -0.075, 0.222])

@@ -88,7 +88,7 @@ class _Scatter:
 
     @property
     def is_seen(self) -> bool:
-        """Whether the pictures tell the frames' errors well enough for these to be the arm's."""
+        """Whether the pictures show the frames' errors well enough for these to be the arm's."""
         sigma = np.sqrt(np.einsum("nii->ni", self.noise))
         return float(np.median(sigma)) < _SEEN
 
