@@ -89,8 +89,8 @@ class _Scatter:
     @property
     def is_seen(self) -> bool:
         """Whether the pictures show the frames' errors well enough for these to be the arm's."""
-        sigma = np.sqrt(np.einsum("nii->ni", self.noise))
-        return float(np.median(sigma)) < _SEEN
+        variance = np.einsum("nii->ni", self.noise)
+        return float(np.sqrt(variance.mean())) < _SEEN
 
     def thinned(self) -> _Scatter:
         """Every so many of the frames; what the pictures say of the shared numbers stays."""
