@@ -35,7 +35,7 @@ from scipy.spatial.transform import Rotation
 from calib.calibration.uncertainty import optics_at, projection_sigma_px, workpiece_sigma_m
 from calib.chain import rigid
 from calib.chain.effects import make_effect
-from calib.chain.model import CellModel, evaluate
+from calib.chain.model import CellModel, Errors, evaluate
 from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
 from calib.chain.state import ChainState
@@ -219,7 +219,7 @@ def one(task: Task) -> Run:
     guess = start(true)
     fit = fit_joint(guess, views, unknowns_of(guess), Noise(0.2, 3e-4, 3e-4))
     seconds = time.process_time() - began
-    state = evaluate(fit.model, views, flange_error=fit.flange_error)
+    state = evaluate(fit.model, views, errors=Errors(fit.flange_error))
     free = fit_free_poses(
         state.optics, state.camera_from_board, state.points_m, views.corners_px, ()
     )

@@ -10,7 +10,7 @@ from benchmarks.solver_speed_problem import BOARD, FREE, HEIGHT, TRUE, WIDTH
 from calib.chain import rigid
 from calib.chain.effects import make_effect
 from calib.chain.kinematics import arm
-from calib.chain.model import CellModel
+from calib.chain.model import CellModel, Errors
 from calib.chain.projection import project
 from calib.solver.joint import assemble
 from calib.solver.unknowns import amounts, dependence, prior_information, unknowns_of
@@ -73,7 +73,7 @@ def normal_equations(model: CellModel, views: Views) -> FloatArray:
     """Linearise the chain and go once over all corners."""
     unknowns = unknowns_of(model, (*FREE[:6],))
     error = np.zeros((len(views), 6))
-    found = dependence(model, views, unknowns, kinematics=arm("ur5e"), flange_error=error)
+    found = dependence(model, views, unknowns, kinematics=arm("ur5e"), errors=Errors(error))
     prior = (amounts(model, unknowns), prior_information(unknowns))
     weight = np.ones(views.corners_px.shape[:2])
     equations, _ = assemble(found, views, weight, error, None, prior)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from calib.chain import rigid
-from calib.chain.model import CellModel, evaluate
+from calib.chain.model import CellModel, Errors, evaluate
 from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
 from drivers.camera import FocusSetting, Frame
@@ -206,7 +206,7 @@ class SimCamera:
         seen = [*self._seen, *more]
         views = views_of(self._cell, [row for row, _ in seen])
         errors = np.array([error for _, error in seen])
-        return views, evaluate(self._cell.model, views, flange_error=errors)
+        return views, evaluate(self._cell.model, views, errors=Errors(errors))
 
     def _look(
         self, more: list[tuple[Row, FloatArray]] | None = None

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib.chain.model import CellModel, evaluate
+from calib.chain.model import CellModel, Errors, evaluate
 from calib.chain.sight import in_domain
 from calib.chain.state import ChainState
 from calib.views import BoolArray, FloatArray, Views
@@ -67,7 +67,7 @@ def synthesize_corners(
         Whether the camera reports what distance it is focused at.
     """
     errors = repeatability.draw(arm_rng, (len(log),))
-    state = evaluate(model, log, flange_error=errors)
+    state = evaluate(model, log, errors=Errors(errors))
     corners = state.pixels()
     corners += corner_sigma_px * corner_rng.standard_normal(corners.shape)
     corners[~_visible(state, corners, log)] = np.nan

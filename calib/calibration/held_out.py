@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chain.model import CellModel, kinematics_of
+from calib.chain.model import CellModel, Errors, kinematics_of
 from calib.distributions import chi2_limit
 from calib.solver.each_frame import EachFrame, each_frame
 from calib.solver.elimination import solve_scaled
@@ -104,7 +104,7 @@ def frame_by_frame(
         N views, (N, M) what each corner counts, (N, 6) the flange's errors that are put in.
     """
     arm = kinematics_of(views)
-    found = dependence(model, views, fit.unknowns, kinematics=arm, flange_error=flange_error)
+    found = dependence(model, views, fit.unknowns, kinematics=arm, errors=Errors(flange_error))
     return each_frame(found, views.corners_px, weight / fit.noise.corner_px**2, flange_error)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.calibration.result import VALUES
-from calib.chain.model import CellModel, evaluate
+from calib.chain.model import CellModel, Errors, evaluate
 from calib.solver.free_poses import fit_free_poses
 from calib.solver.joint import JointFit
 from calib.views import FloatArray, Views
@@ -64,7 +64,7 @@ def _scaled(model: CellModel, factor: float) -> CellModel:
 
 def _cost(fit: JointFit, model: CellModel, still: JointFit, views: Views) -> float:
     """-2 log likelihood of the pictures: poses and camera free, the law's shape held."""
-    state = evaluate(model, views, flange_error=fit.flange_error)
+    state = evaluate(model, views, errors=Errors(fit.flange_error))
     free = fit_free_poses(
         state.optics,
         state.camera_from_board,

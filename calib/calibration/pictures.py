@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chain.model import evaluate
+from calib.chain.model import Errors, evaluate
 from calib.chain.optics import COLUMN
 from calib.chain.sight import off_axis_rad
 from calib.solver.free_poses import FreePoseFit, fit_free_poses
@@ -40,7 +40,7 @@ class Pictures:
     @classmethod
     def of_joint(cls, joint: JointFit, views: Views) -> Pictures:
         """Those of a joint fit."""
-        state = evaluate(joint.model, views, flange_error=joint.flange_error)
+        state = evaluate(joint.model, views, errors=Errors(joint.flange_error))
         return cls(
             state.optics, state.camera_from_board, state.points_m, views.corners_px, joint.weight
         )

@@ -15,7 +15,7 @@ from calib.calibration.result import VALUES, Calibration, PositionError, Solutio
 from calib.calibration.robot import RobotFit, fit_robot, hand_eye_of
 from calib.calibration.shared import joint_covariance, joint_focus
 from calib.calibration.uncertainty import UncertaintyMap, uncertainty_map
-from calib.chain.model import evaluate
+from calib.chain.model import Errors, evaluate
 from calib.chain.optics import COLUMN
 from calib.errors import CalibrationError
 from calib.handeye import camera_position_error_m
@@ -168,7 +168,7 @@ def joint_solution(views: Views, baseline: Baseline, robot: RobotFit, joint: Joi
 
     Poses that the robot had a say in would agree with the robot by construction.
     """
-    state = evaluate(joint.model, views.take(robot.taken), flange_error=joint.flange_error)
+    state = evaluate(joint.model, views.take(robot.taken), errors=Errors(joint.flange_error))
     optics = np.zeros((len(views), state.optics.shape[1]))
     optics[robot.taken] = state.optics
     start = np.full((len(views), 4, 4), np.nan)

@@ -101,6 +101,10 @@ class Errors:
     focal: FloatArray | None = None
 
 
+EXACT = Errors()
+"""Nothing scatters."""
+
+
 def _call_at(evaluate: ChainState, stage: Stage, model: CellModel, errors: Errors) -> None:
     if stage == "place":
         evaluate.place()
@@ -139,12 +143,11 @@ class StagedEvaluation:
         views: Views,
         *,
         kinematics: ArmKinematics | None = None,
-        flange_error: FloatArray | None = None,
-        focal_error: FloatArray | None = None,
+        errors: Errors = EXACT,
     ) -> None:
         self.state = start(model, views, kinematics or kinematics_of(views))
         self._model, self._stages = model, stages(model)
-        self._errors = Errors(flange_error, focal_error)
+        self._errors = errors
         self._before: list[ChainState] = []
         for stage in self._stages:
             self._before.append(self.state.copy())
@@ -190,8 +193,7 @@ def evaluate(
     views: Views,
     *,
     kinematics: ArmKinematics | None = None,
-    flange_error: FloatArray | None = None,
-    focal_error: FloatArray | None = None,
+    errors: Errors = EXACT,
 ) -> ChainState:
     """ChainState the chain for every logged frame.
 
@@ -201,11 +203,8 @@ def evaluate(
         The cell, and the log (corners are not looked at).
     kinematics:
         The arm; looked up from the log where it is not given.
-    flange_error:
-        (N, 6) small increment of the flange in its own frame, metres and radians: the robot's
-        repeatability, or an estimate of it.
-    focal_error:
-        (N,) error of the focal length as a share of it.
+    errors:
+        What scatters frame by frame, such as the robot's repeatability, or an estimate of it.
 
     Returns
     -------
@@ -213,12 +212,10 @@ def evaluate(
     """
     state = start(model, views, kinematics or kinematics_of(views))
     for stage in stages(model):
-        _call_at(state, stage, model, Errors(flange_error, focal_error))
+        _call_at(state, stage, model, errors)
     return state
 
 
-def predict(
-    model: CellModel, views: Views, *, flange_error: FloatArray | None = None
-) -> FloatArray:
+def predict(model: CellModel, views: Views, *, errors: Errors = EXACT) -> FloatArray:
     """(N, M, 2) pixels at which this cell shows the corners at the logged poses."""
-    return evaluate(model, views, flange_error=flange_error).pixels()
+    return evaluate(model, views, errors=errors).pixels()

@@ -381,7 +381,7 @@ def _scatter(twin: JointFit, has_robot: bool) -> tuple[str, ...]:
 
 
 def _pictures(twin: JointFit, views: Views) -> tuple[str, ...]:
-    state = evaluate(twin.model, views, **frame_errors(twin.own_error))
+    state = evaluate(twin.model, views, errors=frame_errors(twin.own_error))
     return blur_notes(fit_blur(views.blur_px, state.distance_m))
 
 

@@ -75,7 +75,7 @@ def locate(fit: JointFit, views: Views, *, periods: bool = True) -> list[Cell]:
 
     Without `periods` in time where a law that swings was looked for already.
     """
-    state = evaluate(fit.model, views, **frame_errors(fit.own_error))
+    state = evaluate(fit.model, views, errors=frame_errors(fit.own_error))
     probe = _Probe(fit, views, state)
     cells = [cell for covariate in COVARIATES for cell in probe.along(covariate)]
     if periods:

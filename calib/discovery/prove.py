@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chain.model import CellModel, kinematics_of, predict
+from calib.chain.model import CellModel, Errors, kinematics_of, predict
 from calib.chain.projection import project_with_jacobians
 from calib.solver.joint import JointFit
 from calib.solver.noise import Noise
@@ -50,10 +50,8 @@ class Floor:
 
 def floor_of(model: CellModel, views: Views, noise: Noise) -> Floor:
     """Prediction error that noise alone makes on these frames, and how likely they are."""
-    focal = np.zeros(len(views)) if noise.focal > 0.0 else None
-    found = dependence(
-        model, views, (), kinematics=kinematics_of(views), flange_error=None, focal_error=focal
-    )
+    errors = Errors(focal=np.zeros(len(views)) if noise.focal > 0.0 else None)
+    found = dependence(model, views, (), kinematics=kinematics_of(views), errors=errors)
     state = found.state
     pixels, j_pose, j_optics = project_with_jacobians(
         state.optics, state.camera_from_board, state.points_m

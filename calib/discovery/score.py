@@ -113,7 +113,7 @@ def extended(
     amounts = amount_unknowns(model, fit.unknowns)
     unknowns = (*fit.unknowns, *amounts)
     found = dependence(
-        model, views, unknowns, kinematics=kinematics_of(views), **frame_errors(fit.own_error)
+        model, views, unknowns, kinematics=kinematics_of(views), errors=frame_errors(fit.own_error)
     )
     shift = fit.equations.corner_shift if fit.equations.corner_numbers else None
     prior = (amounts_of(model, unknowns), prior_information(unknowns))

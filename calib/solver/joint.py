@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypedDict
 
 import numpy as np
 
 from calib.chain import rigid
 from calib.chain.kinematics import ArmKinematics
-from calib.chain.model import CellModel, evaluate, kinematics_of
+from calib.chain.model import CellModel, Errors, evaluate, kinematics_of
 from calib.chain.projection import project
 from calib.solver.accumulate import LocalEquations, local_equations
 from calib.solver.elimination import FrameEquations, joined, solve_scaled
@@ -33,17 +32,9 @@ BLOCK_FRAMES = 64
 """Frames whose products are at hand together: they stay in the cache, and memory stays small."""
 
 
-class FrameErrors(TypedDict):
-    """A frame's own errors as `evaluate` takes them."""
-
-    flange_error: FloatArray
-    focal_error: FloatArray | None
-
-
-def frame_errors(own_error: FloatArray) -> FrameErrors:
+def frame_errors(own_error: FloatArray) -> Errors:
     """(N, 6) errors of the flange, or (N, 7) with that of the focal length, for `evaluate`."""
-    focal = own_error[:, 6] if own_error.shape[1] > 6 else None
-    return {"flange_error": own_error[:, :6], "focal_error": focal}
+    return Errors(own_error[:, :6], own_error[:, 6] if own_error.shape[1] > 6 else None)
 
 
 @dataclass(frozen=True)
@@ -239,7 +230,7 @@ class _Iteration:
             self.views,
             self.unknowns,
             kinematics=self.arm,
-            **frame_errors(self.state.own_error),
+            errors=frame_errors(self.state.own_error),
         )
         self.equations, self.residual = self._assemble(self.found, self.state)
 
@@ -250,7 +241,9 @@ class _Iteration:
 
     def cost(self, at: JointState) -> float:
         """Penalised square sum at that state, for the present weights."""
-        seen = evaluate(at.model, self.views, kinematics=self.arm, **frame_errors(at.own_error))
+        seen = evaluate(
+            at.model, self.views, kinematics=self.arm, errors=frame_errors(at.own_error)
+        )
         pixels = project(seen.optics, seen.camera_from_board, seen.points_m)
         square = np.nansum((seen.straightened(self.views.corners_px) - pixels) ** 2, axis=2)
         cost = float(np.sum(self.weight * square)) / at.noise.corner_px**2

@@ -101,7 +101,7 @@ def _batch(
     model: CellModel, views: Views, unknowns: tuple[Unknown, ...], noise: Noise
 ) -> FloatArray:
     views = shown(model, views)
-    found = dependence(model, views, unknowns, kinematics=kinematics_of(views), flange_error=None)
+    found = dependence(model, views, unknowns, kinematics=kinematics_of(views))
     still = np.zeros((len(views), 6))
     frames = each_frame(found, views.corners_px, views.seen / noise.corner_px**2, still)
     return frames.marginal(noise.flange_information)[:, :-1, :-1]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from calib.chain import rigid
 from calib.chain.effect import Parameter, Present
 from calib.chain.kinematics import ArmKinematics
-from calib.chain.model import CellModel, StagedEvaluation
+from calib.chain.model import EXACT, CellModel, Errors, StagedEvaluation
 from calib.chain.optics import COLUMN
 from calib.chain.state import ChainState
 from calib.views import FloatArray, Views
@@ -208,17 +208,14 @@ def dependence(
     unknowns: tuple[Unknown, ...],
     *,
     kinematics: ArmKinematics | None,
-    flange_error: FloatArray | None,
-    focal_error: FloatArray | None = None,
+    errors: Errors = EXACT,
 ) -> Dependence:
     """Differentiate the chain by every free number (central differences, one evaluation a side)."""
-    staged = StagedEvaluation(
-        model, views, kinematics=kinematics, flange_error=flange_error, focal_error=focal_error
-    )
+    staged = StagedEvaluation(model, views, kinematics=kinematics, errors=errors)
     columns = [_column(staged, model, unknown) for unknown in unknowns]
     by_own = [_flange_column(staged, k) for k in range(6)]
-    if focal_error is not None:
-        sides = staged.state.optics[:, _SIDES] / (1.0 + focal_error[:, None])
+    if errors.focal is not None:
+        sides = staged.state.optics[:, _SIDES] / (1.0 + errors.focal[:, None])
         by_own.append(_Column(np.array(_SIDES, dtype=np.int64), sides, None, None))
     n, p = len(views), len(unknowns)
     followed = np.zeros(len(model.optics), dtype=bool)

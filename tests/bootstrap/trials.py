@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.chain import rigid
 from calib.chain.kinematics import arm
-from calib.chain.model import CellModel, evaluate, predict
+from calib.chain.model import CellModel, Errors, evaluate, predict
 from calib.detection import Detection
 from calib.views import BoolArray, FloatArray, Views
 from cell.devices.simulated_cell import simulated_cell
@@ -293,7 +293,7 @@ def frame_of(
     )
     log = {"robot_model": cell.robot.model, "joints_rad": joints_rad[None]}
     views = replace(blank, base_from_flange=logged[None], **log)
-    corners = predict(truth_of(cell), views, flange_error=error)[0]
+    corners = predict(truth_of(cell), views, errors=Errors(error))[0]
     corners = corners + truth.noise.corner_px * rng.standard_normal(corners.shape)
     state = ArmState(
         host_t_s=0.0,

@@ -17,7 +17,7 @@ from calib.chain.empirical import (
     site_named,
     span,
 )
-from calib.chain.model import evaluate, predict
+from calib.chain.model import Errors, evaluate, predict
 from calib.chain.optics import COLUMN
 from calib.views import Mount
 from tests.chain.cells import cell, mirrored
@@ -74,7 +74,7 @@ def test_the_flange_error_stands_in_the_flange_s_own_frame() -> None:
     model, views = cell()
     error = np.random.default_rng(1).normal(0, 1e-3, (len(views), 6))
     moved = replace(views, base_from_flange=views.base_from_flange @ rigid.from_vector(error))
-    assert np.allclose(predict(model, views, flange_error=error), predict(model, moved))
+    assert np.allclose(predict(model, views, errors=Errors(error)), predict(model, moved))
 
 
 def test_the_order_in_which_effects_are_listed_does_not_matter() -> None:

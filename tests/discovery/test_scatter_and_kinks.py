@@ -9,7 +9,7 @@ import pytest
 
 from calib.chain.effects import make_effect
 from calib.chain.kinematics import arm
-from calib.chain.model import evaluate
+from calib.chain.model import Errors, evaluate
 from calib.chain.projection import project
 from calib.discovery.diagnose import diagnose
 from calib.discovery.residual_structure import ResidualStructure
@@ -32,7 +32,7 @@ def with_focus_by_chance(seed: int) -> tuple[Views, FloatArray]:
     rng = np.random.default_rng(seed)
     error = SCATTER * rng.standard_normal(len(LOG))
     flange = np.repeat([NOISE.flange_m, NOISE.flange_rad], 3) * rng.standard_normal((len(LOG), 6))
-    state = evaluate(plain_cell(), LOG, flange_error=flange, focal_error=error)
+    state = evaluate(plain_cell(), LOG, errors=Errors(flange, error))
     corners = project(state.optics, state.camera_from_board, state.points_m)
     corners += NOISE.corner_px * rng.standard_normal(corners.shape)
     return replace(LOG, corners_px=corners), error
@@ -88,7 +88,7 @@ def searched(views: Views) -> Search:
 def test_one_frame_that_is_far_off_is_no_scatter():
     error = np.zeros(len(LOG))
     error[4] = 6e-3
-    state = evaluate(plain_cell(), LOG, focal_error=error)
+    state = evaluate(plain_cell(), LOG, errors=Errors(focal=error))
     corners = project(state.optics, state.camera_from_board, state.points_m)
     corners += NOISE.corner_px * np.random.default_rng(74).standard_normal(corners.shape)
     search = searched(replace(LOG, corners_px=corners))

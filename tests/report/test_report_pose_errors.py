@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from calib.chain.effects import make_effect
-from calib.chain.model import CellModel, predict
+from calib.chain.model import CellModel, Errors, predict
 from calib.chain.optics import optics_row
 from calib.views import Board, Views
 from cell.views.report.from_diagnosis import diagnosis_evidence
@@ -43,7 +43,7 @@ def log(frames: int = 12) -> Views:
 
 def recorded(model: CellModel, flange_error: np.ndarray | None = None) -> Views:
     views = log()
-    return replace(views, corners_px=predict(model, views, flange_error=flange_error))
+    return replace(views, corners_px=predict(model, views, errors=Errors(flange_error)))
 
 
 def test_a_flange_that_is_elsewhere_than_logged_is_found_to_the_micrometre() -> None:

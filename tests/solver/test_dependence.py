@@ -6,7 +6,7 @@ import pytest
 from calib.chain import rigid
 from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue, make_effect
-from calib.chain.model import StagedEvaluation, evaluate
+from calib.chain.model import Errors, StagedEvaluation, evaluate
 from calib.chain.optics import COLUMN, OPTICS
 from calib.solver.unknowns import dependence, moved, unknowns_of
 from calib.views import Mount
@@ -17,11 +17,11 @@ FREE = ("alpha_px", "beta_px", "u0_px", "v0_px", "k1", "k2")
 
 def test_only_what_something_follows_is_active() -> None:
     model, views = cell(frames=3)
-    found = dependence(model, views, unknowns_of(model), kinematics=None, flange_error=None)
+    found = dependence(model, views, unknowns_of(model), kinematics=None)
     assert {OPTICS[c] for c in found.active} == set(FREE)
     assert found.modes.shape == (0, 70, 3)
     warped = model.with_effects([make_effect("board_warp", {})])
-    found = dependence(warped, views, unknowns_of(warped), kinematics=None, flange_error=None)
+    found = dependence(warped, views, unknowns_of(warped), kinematics=None)
     assert found.modes.shape == (3, 70, 3)
 
 
@@ -64,14 +64,14 @@ def test_a_resumed_evaluation_ends_where_a_whole_one_does(mount: Mount) -> None:
     model, views = cell(mount, frames=10)
     model = model.with_effects(_everything())
     error = np.full((10, 6), 1e-4)
-    staged = StagedEvaluation(model, views, flange_error=error)
+    staged = StagedEvaluation(model, views, errors=Errors(error))
     for unknown in unknowns_of(model, FREE):
         changed = moved(model, (unknown,), np.array([unknown.typical]))
         again = staged.from_stage(changed, staged.entry(unknown.place))
-        whole = evaluate(changed, views, flange_error=error)
+        whole = evaluate(changed, views, errors=Errors(error))
         assert np.array_equal(again.optics, whole.optics), unknown.name
         assert np.array_equal(again.camera_from_board, whole.camera_from_board), unknown.name
         assert np.array_equal(again.points_m, whole.points_m), unknown.name
-    untouched = evaluate(model, views, flange_error=error)
+    untouched = evaluate(model, views, errors=Errors(error))
     assert np.array_equal(staged.state.optics, untouched.optics)
     assert np.array_equal(staged.state.points_m, untouched.points_m)

@@ -15,7 +15,7 @@ from calib.chain.covariates import COVARIATES, covariate_named
 from calib.chain.effect import Effect, Present
 from calib.chain.effects import catalogue
 from calib.chain.empirical import SITES, Curve, present_curve, span
-from calib.chain.model import CellModel, evaluate, predict
+from calib.chain.model import CellModel, Errors, evaluate, predict
 from calib.chain.optics import COLUMN, NEVER_FREE, OPTICS
 from calib.chain.projection import project_with_jacobians
 from calib.solver.unknowns import Dependence, Unknown, dependence, unknowns_of
@@ -74,9 +74,9 @@ def _check(
     numbers = _all_numbers(model, lens)
     error = np.random.default_rng(5).normal(0.0, 2e-4, (len(views), 6))
     run = Run(model, views, numbers, error)
-    found = dependence(model, views, numbers, kinematics=None, flange_error=error)
+    found = dependence(model, views, numbers, kinematics=None, errors=Errors(error))
     by_free, by_flange = _pixels_by(found)
-    pixels = predict(model, views, flange_error=error)[:, CORNERS]
+    pixels = predict(model, views, errors=Errors(error))[:, CORNERS]
     ours = np.concatenate([by_free, by_flange], axis=-1)[:, CORNERS]
     wanted = []
     for i in frames:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from calib.chain.model import Errors
 from calib.solver.each_frame import each_frame
 from calib.solver.joint import JointFit, fit_joint
 from calib.solver.noise import Noise, scaled
@@ -13,7 +14,7 @@ from tests.calibration.fitted import fitted
 def _apart(fit: JointFit, views: Views) -> tuple[np.ndarray, np.ndarray]:
     """Marginal equations with the flange at the fit's errors, and with it free."""
     found = dependence(
-        fit.model, views, fit.unknowns, kinematics=None, flange_error=fit.flange_error
+        fit.model, views, fit.unknowns, kinematics=None, errors=Errors(fit.flange_error)
     )
     weight = fit.weight / fit.noise.corner_px**2
     frames = each_frame(found, views.corners_px, weight, fit.flange_error)

@@ -10,7 +10,7 @@ import numpy as np
 from calib.calibration import calibrate
 from calib.calibration.mapping import as_mapping
 from calib.chain.effects import make_effect
-from calib.chain.model import CellModel, predict
+from calib.chain.model import CellModel, Errors, predict
 from calib.chain.optics import optics_row
 from calib.chain.rigid import from_vector
 from calib.views import FloatArray, Mount, Views
@@ -80,5 +80,5 @@ def new_views(
     rng = np.random.default_rng(1000 + seed)
     error = rng.normal(0, 1, (len(log), 6)) * flange
     error *= [FLANGE_M] * 3 + [FLANGE_RAD] * 3
-    corners = predict(model, log, flange_error=error)
+    corners = predict(model, log, errors=Errors(error))
     return replace(log, corners_px=corners + rng.normal(0, NOISE_PX, corners.shape))

@@ -83,7 +83,7 @@ class FrameBlocks:
 
 def frame_blocks(fit: JointFit, views: Views) -> FrameBlocks:
     """Linearise every site of the chain around a fit, frame by frame."""
-    state = evaluate(fit.model, views, **frame_errors(fit.own_error))
+    state = evaluate(fit.model, views, errors=frame_errors(fit.own_error))
     sites = site_columns(views)
     presents = [present_curve(Curve(site, CONSTANT, 0.0, 1.0), state) for site in sites]
     _, found, _, base = extended(fit, views, presents)

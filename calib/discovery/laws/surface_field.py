@@ -233,7 +233,11 @@ def _finest(surface: Surface, views: Views) -> tuple[int, int] | None:
 def _normals(fit: JointFit, views: Views, surface: Surface) -> _Normals:
     bare = fit.model.with_effects(_blank(p, surface) for p in fit.model.effects)
     found = dependence(
-        bare, views, fit.unknowns, kinematics=kinematics_of(views), **frame_errors(fit.own_error)
+        bare,
+        views,
+        fit.unknowns,
+        kinematics=kinematics_of(views),
+        errors=frame_errors(fit.own_error),
     )
     sides = sides_of(surface, views)
     over = rectangle(sides, _LENGTHS[0] * max(sides), _finest(surface, views))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chain.model import evaluate
+from calib.chain.model import Errors, evaluate
 from calib.chain.state import ChainState
 from calib.views import Views
 from cell.devices.simulated_cell import home_of, log_of, simulated_cell
@@ -44,7 +44,7 @@ def run_trial(plan: Plan, seed: int) -> Trial:
     cell = simulated_cell(plan.cell, home_of(plan), seed=seed)
     views = simulated_views(plan, cell)
     scatter = cell.repeatability.draw(cell.random(ARM_STREAM), (len(views),))
-    return Trial(cell, views, evaluate(cell.model, log_of(plan, cell), flange_error=scatter))
+    return Trial(cell, views, evaluate(cell.model, log_of(plan, cell), errors=Errors(scatter)))
 
 
 def drawn(

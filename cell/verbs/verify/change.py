@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.chain import rigid
-from calib.chain.model import CellModel, evaluate
+from calib.chain.model import CellModel, Errors, evaluate
 from calib.chain.projection import project
 from calib.solver.elimination import Reduced, solve_scaled
 from calib.solver.joint import assemble
@@ -128,7 +128,7 @@ class _Fit:
         return moved(self.start, self.old.unknowns, self.spread @ state.z)
 
     def cost(self, state: _State) -> float:
-        seen = evaluate(self.model(state), self.views, flange_error=state.flange_error)
+        seen = evaluate(self.model(state), self.views, errors=Errors(state.flange_error))
         pixels = project(seen.optics, seen.camera_from_board, seen.points_m)
         square = np.nansum((seen.straightened(self.views.corners_px) - pixels) ** 2, axis=2)
         cost = float((self.weight * square).sum()) / self.noise.corner_px**2
@@ -142,7 +142,7 @@ class _Fit:
             self.views,
             self.old.unknowns,
             kinematics=None,
-            flange_error=state.flange_error,
+            errors=Errors(state.flange_error),
         )
         none = np.zeros(len(self.old.unknowns))
         return assemble(found, self.views, self.weight, state.flange_error, None, (none, none))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chain.model import CellModel, evaluate
+from calib.chain.model import CellModel, Errors, evaluate
 from calib.chain.projection import project, project_with_jacobians
 from calib.chain.rigid import inverse
 from calib.distributions import normal_tail
@@ -140,7 +140,7 @@ class _Seen:
         self, model: CellModel, flange_error: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """(N, K) optics, and (N, 4, 4) cameras from the frame in which the board stands still."""
-        state = evaluate(model, self.views, flange_error=flange_error)
+        state = evaluate(model, self.views, errors=Errors(flange_error))
         if state.in_hand:
             return state.optics, inverse(state.base_from_camera)
         return state.optics, inverse(state.base_from_fixed) @ state.base_from_flange

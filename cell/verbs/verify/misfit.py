@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.chain.model import CellModel, evaluate, predict
+from calib.chain.model import CellModel, Errors, evaluate, predict
 from calib.chain.optics import COLUMN
 from calib.chain.rigid import inverse
 from calib.distributions import chi2_limit
@@ -193,7 +193,7 @@ def _flange_columns(model: CellModel, views: Views, noise: Noise) -> Iterator[Fl
     for k, size in enumerate(sigma):
         error = np.zeros((len(views), 6))
         error[:, k] = size
-        ahead, behind = (predict(model, views, flange_error=e) for e in (error, -error))
+        ahead, behind = (predict(model, views, errors=Errors(e)) for e in (error, -error))
         for frame in range(len(views)):
             one = np.zeros_like(ahead)
             one[frame] = (ahead[frame] - behind[frame]) / 2
