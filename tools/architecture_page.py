@@ -40,7 +40,10 @@ CORNER = (
     ),
     ("calib.chain.state:ChainState.move_arm", "moved joints and links move the logged flange"),
     ("calib.chain.state:ChainState.place", "where the camera sees the board: camera_from_board"),
-    ("calib.chain.projection:project", "lens and sensor: the corner becomes a pixel"),
+    (
+        "calib.chain.projection:project_with_jacobians",
+        "lens and sensor: the corner becomes a pixel, with its derivatives",
+    ),
     ("calib.detection:detect", "the same corner in a picture, with its uncertainty"),
     ("calib.calibration:calibrate", "every solution of a recording"),
     ("calib.solver.joint:fit_joint", "the difference of both, made least over all corners"),

@@ -18,6 +18,14 @@ keep_out:
 - {name: cabinet, low_m: [-0.9, 0.4, 0.0], high_m: [-0.5, 0.8, 1.0]}
 """
 
+SIMULATION = """\
+simulation:
+  mounted: {p_m: [0.0, 0.0, 0.05], rpy_deg: [0, 0, 0]}
+  fixed: {p_m: [-0.55, -0.2, 0.0], rpy_deg: [180, 0, 0]}
+  optics: {alpha_px: 500, beta_px: 500, u0_px: 320, v0_px: 240}
+  noise: {corner_px: 0.1, read_levels: 0.0, full_well_electrons: null}
+"""
+
 PLAN = """\
 schema: cell.plan/1
 name: four views

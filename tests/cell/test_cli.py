@@ -16,17 +16,10 @@ from cell.cli.app import main
 from cell.storage.defaults import DRY_RUN_PLAN
 from cell.storage.files.plan_file import read_plan
 from cell.storage.recording import read_recording
-from tests.cell.plans import CELL, PLAN
+from tests.cell.plans import CELL, PLAN, SIMULATION
 from tests.cell.recordings import HEADER, corner_rows, frame_line
 
 ROOT = Path(__file__).parents[2]
-SIMULATION = """\
-simulation:
-  mounted: {p_m: [0.0, 0.0, 0.05], rpy_deg: [0, 0, 0]}
-  fixed: {p_m: [-0.55, -0.2, 0.0], rpy_deg: [180, 0, 0]}
-  optics: {alpha_px: 500, beta_px: 500, u0_px: 320, v0_px: 240}
-  noise: {corner_px: 0.1, read_levels: 0.0, full_well_electrons: null}
-"""
 
 
 class CommandResult:
