@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -172,9 +173,14 @@ def pictures_of(tour: Tour, topic: str = "/camera/image_raw") -> Iterator[Messag
 
 
 def write_bag(
-    path: Path, messages: list[Message], storage: StoragePlugin = StoragePlugin.MCAP
+    path: Path,
+    messages: list[Message],
+    storage: StoragePlugin = StoragePlugin.MCAP,
+    zstd: CompressionMode = CompressionMode.NONE,
 ) -> Path:
-    with Writer(path, version=9, storage_plugin=storage) as writer:
+    writer = Writer(path, version=9, storage_plugin=storage)
+    writer.set_compression(zstd, CompressionFormat.ZSTD)
+    with writer:
         known: dict[str, Any] = {}
         for topic, kind, at, message in sorted(messages, key=lambda m: m[2]):
             if topic not in known:
@@ -182,3 +188,37 @@ def write_bag(
             data = TYPES.serialize_cdr(message, kind)
             writer.write(known[topic], START_NS + round(1e9 * at), data)
     return path
+
+
+ROS1_TYPES = get_typestore(Stores.ROS1_NOETIC)
+
+
+def write_ros1_bag(
+    path: Path, messages: list[Message], compression: Ros1Writer.CompressionFormat | None = None
+) -> Path:
+    """The same messages as ROS 1 has them: a header counts, transforms are tf2_msgs'."""
+    writer = Ros1Writer(path)
+    if compression is not None:
+        writer.set_compression(compression)
+    with writer:
+        known: dict[str, Any] = {}
+        for topic, kind, at, message in sorted(messages, key=lambda m: m[2]):
+            if topic not in known:
+                known[topic] = writer.add_connection(topic, kind, typestore=ROS1_TYPES)
+            content = _as_ros1(message)
+            data = ROS1_TYPES.serialize_ros1(content, kind)
+            writer.write(known[topic], START_NS + round(1e9 * at), data)
+    return path
+
+
+def _as_ros1(value: Any) -> Any:
+    """A message of ROS 2 as one of ROS 1."""
+    if isinstance(value, list):
+        return [_as_ros1(each) for each in value]
+    kind = getattr(value, "__msgtype__", None)
+    if kind is None:
+        return value
+    fields = {k: _as_ros1(v) for k, v in vars(value).items() if not k.startswith("__")}
+    if kind == "std_msgs/msg/Header":
+        fields["seq"] = 0
+    return ROS1_TYPES.types[kind](**fields)

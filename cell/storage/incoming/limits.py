@@ -17,6 +17,15 @@ LOG_BYTES: Final = 1024 * MIB
 PICTURE_BYTES: Final = 512 * MIB
 """A picture's file."""
 
+CHUNK_BYTES: Final = 512 * MIB
+"""What one compressed piece of a bag unpacks to: more than the largest picture's 400 MB."""
+OPEN_CHUNKS_BYTES: Final = 1024 * MIB
+"""Of a bag's pieces whose times overlap, which are held together."""
+MESSAGE_BYTES: Final = 4 * MIB
+"""A message without pixels: twenty thousand transforms, or a robot's description."""
+MESSAGES: Final = 4_000_000
+"""Of a bag without their pixels: joints at 1 kHz for an hour."""
+
 PICTURE_PIXELS: Final = 2**26
 """Pixels of a picture, 8192 x 8192: the largest area sensors of machine vision have 65 Mpx."""
 PICTURE_SIDE: Final = 2**16

@@ -9,7 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from cell.errors import InputError
-from cell.storage.incoming import plain_file
+from cell.storage.incoming import plain_file, read_bytes
+from cell.storage.incoming.limits import YAML_BYTES
+from cell.verbs.importing.bags.bounds import bounded_unpacking, check_message, check_storages
+
+IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+PICTURES = (IMAGE, COMPRESSED)
+"""Types of the messages that have pixels."""
 
 _FILES = (".mcap", ".db3", ".bag")
 _METADATA = "metadata.yaml"
@@ -55,6 +61,8 @@ class Bag:
         if not chosen:
             return
         for connection, time_ns, data in self._reader.messages(connections=chosen):
+            pixels = connection.msgtype in PICTURES
+            check_message(self.path, connection.topic, data, pixels=pixels)
             yield connection.topic, time_ns, self._reader.deserialize(data, connection.msgtype)
 
 
@@ -87,10 +95,13 @@ def open_bag(path: Path) -> Iterator[Bag]:
         raise InputError(f"{path}: {_INSTALL}") from None
     if not path.is_dir() and not plain_file(path):
         raise InputError(f"{path}: is not there")
+    if path.is_dir():
+        read_bytes(path / _METADATA, YAML_BYTES)  # refuses what is too large to be one
     try:
         # bags of sqlite3 carried no definitions of their messages up to ROS 2 Humble
         usual = get_typestore(Stores.LATEST)
-        with AnyReader([path], default_typestore=usual) as reader:
+        with bounded_unpacking(path), AnyReader([path], default_typestore=usual) as reader:
+            check_storages(path, reader)
             yield Bag(path, reader)
     except InputError:
         raise

@@ -10,6 +10,7 @@ import numpy as np
 
 from calib.views import FloatArray
 from cell.errors import InputError
+from cell.storage.incoming import limits
 from cell.verbs.importing.bags import topics
 from cell.verbs.importing.bags.bag import Bag, Topic
 from cell.verbs.importing.bags.tracks import Joints, sorted_once
@@ -95,7 +96,10 @@ def read_contents(bag: Bag, image: Topic, joint_topic: Topic | None) -> Contents
     transforms = topics.transform_topics(bag)
     joints = None if joint_topic is None else joint_topic.name
     wanted = {image.name, info, description, joints, *transforms} - {None}
-    for topic, received_ns, message in bag.messages({name for name in wanted if name}):
+    messages = bag.messages({name for name in wanted if name})
+    for count, (topic, received_ns, message) in enumerate(messages):
+        if count >= limits.MESSAGES:
+            raise InputError(f"{bag.path}: more than {limits.MESSAGES} messages; cut it shorter")
         if topic == image.name:
             found.unstamped += not (message.header.stamp.sec or message.header.stamp.nanosec)
             found.picture_s.append(found.seconds(message.header, received_ns))

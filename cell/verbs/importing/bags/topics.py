@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable, Sequence
 
 from cell.errors import InputError
-from cell.verbs.importing.bags.bag import Bag, Topic
+from cell.verbs.importing.bags.bag import IMAGE, PICTURES, Bag, Topic
 
-IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO, JOINTS = "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/JointState"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 TEXT = "std_msgs/msg/String"
@@ -19,7 +18,7 @@ _SHOWN = 30
 
 def image_topic(bag: Bag, stated: str | None) -> Topic:
     """The topic of the pictures; raises `InputError` with the list where several can be meant."""
-    able = _of(bag, IMAGE, COMPRESSED)
+    able = _of(bag, *PICTURES)
     if stated is not None:
         return _stated(bag, stated, able, "--image-topic")
     likely = [topic for topic in able if not _NO_PICTURE.search(topic.name)] or able
