@@ -69,6 +69,13 @@ def import_(
     joint_topic: Annotated[
         str | None, typer.Option(help="ROS bag: topic of the joints; /joint_states without.")
     ] = None,
+    pose_topic: Annotated[
+        str | None,
+        typer.Option(
+            help="ROS bag: topic of PoseStamped that has the flange's poses; the only one without,"
+            " where neither transforms nor joints give them."
+        ),
+    ] = None,
     base: Annotated[
         str | None,
         typer.Option(help="ROS bag: frame of the robot's base; base, base_link without."),
@@ -104,7 +111,7 @@ def import_(
         mount=mount,
         robot=robot,
         time_bound_s=time_bound,
-        bag=OfBag(image_topic, joint_topic, base, flange, take, clock_offset),
+        bag=OfBag(image_topic, joint_topic, base, flange, take, clock_offset, pose_topic),
     )
     folder = output or new_folder(f"{source.resolve().name}-imported")
     with counted_progress("finding corners") as progress:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from calib.chain.kinematics import arm
@@ -133,6 +133,17 @@ def transform(parent: str, child: str, matrix: FloatArray, time_s: float) -> Any
     )
 
 
+def pose_stamped(frame: str, matrix: FloatArray, time_s: float) -> Any:
+    turn = Rotation.from_matrix(matrix[:3, :3]).as_quat()
+    return T["geometry_msgs/msg/PoseStamped"](
+        header=header(time_s, frame),
+        pose=T["geometry_msgs/msg/Pose"](
+            position=T["geometry_msgs/msg/Point"](*matrix[:3, 3].tolist()),
+            orientation=T["geometry_msgs/msg/Quaternion"](*turn.tolist()),
+        ),
+    )
+
+
 def transforms(*stamped: Any) -> Any:
     return T["tf2_msgs/msg/TFMessage"](transforms=list(stamped))
 
@@ -191,6 +202,9 @@ def write_bag(
 
 
 ROS1_TYPES = get_typestore(Stores.ROS1_NOETIC)
+ROS1_TYPES.register(
+    get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage")
+)
 
 
 def write_ros1_bag(

@@ -7,10 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from mcap_ros2.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
+from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from calib.chain.kinematics import arm
@@ -148,6 +151,93 @@ def test_the_mcap_library_s_file_with_the_arm_s_own_description(
     assert model is not None
     expected = arm(model).forward(tour.joints(_taken(at_rest) + LATE_S))
     np.testing.assert_allclose(_poses(recording), expected, atol=1e-9)
+
+
+def _poses_bag(path: Path, tour: Tour, at_rest: list[Message], topics: tuple[str, ...]) -> Path:
+    """Written by the mcap library: pictures, and poses of the flange 25 times a second."""
+    kinds = ("geometry_msgs/msg/PoseStamped", "sensor_msgs/msg/CompressedImage")
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        known = {
+            kind: writer.register_msgdef(kind, bags.TYPES.generate_msgdef(kind, ros_version=2)[0])
+            for kind in kinds
+        }
+        times = np.arange(-0.1, tour.end_s + 0.1, 0.04)
+        for at, pose in zip(times, tour.flange(times), strict=True):
+            turn = Rotation.from_matrix(pose[:3, :3]).as_quat()
+            content = {
+                "header": _header(at) | {"frame_id": "robot_base"},
+                "pose": {
+                    "position": dict(zip("xyz", pose[:3, 3].tolist(), strict=True)),
+                    "orientation": dict(zip("xyzw", turn.tolist(), strict=True)),
+                },
+            }
+            stamped = START_NS + round(1e9 * at)
+            for topic in topics:
+                writer.write_message(topic, known[kinds[0]], content, stamped, stamped)
+        for _, _, at, message in at_rest:
+            pixels = message.data.reshape(message.height, message.width)
+            packed = cv2.imencode(".jpg", pixels)[1].tobytes()
+            content = {"header": _header(at), "format": "jpeg", "data": packed}
+            stamped = START_NS + round(1e9 * at)
+            writer.write_message(
+                f"{PICTURES}/compressed", known[kinds[1]], content, stamped, stamped
+            )
+        writer.finish()
+    return path
+
+
+def test_a_topic_of_poses_is_the_flange_s(
+    tour: Tour, at_rest: list[Message], tmp_path: Path
+) -> None:
+    """The only one is taken; of two, the one that is named; bounded in time like transforms."""
+    some = at_rest[:3]
+    bag = _poses_bag(tmp_path / "one.mcap", tour, some, ("/tcp_pose",))
+    result, recording = _imported(bag, tmp_path / "out")
+    assert "of /tcp_pose in robot_base" in _says(result, "poses are")
+    assert "bound 50 ms" in _says(result, "interpolated")
+    expected = tour.flange(_taken(some))
+    np.testing.assert_allclose(_poses(recording), expected, atol=1e-6)
+    words = _refused(bag, tmp_path / "late", "--time-bound", "0.001")
+    assert "no picture has joints or transforms within 1 ms" in words
+    two = _poses_bag(tmp_path / "two.mcap", tour, at_rest[:1], ("/tcp_pose", "/goal"))
+    assert "--pose-topic: /goal, /tcp_pose" in _refused(two, tmp_path / "two")
+    assert "--pose-topic /none: is no such topic" in _refused(
+        two, tmp_path / "two", "--pose-topic", "/none"
+    )
+
+
+def test_a_pose_topic_that_is_named_comes_before_the_transforms(
+    tour: Tour, at_rest: list[Message], tmp_path: Path
+) -> None:
+    some = at_rest[:3]
+    kind = "geometry_msgs/msg/PoseStamped"
+    times = np.arange(-0.1, tour.end_s + 0.1, 0.04)
+    moved = [
+        (topic, kind, at, bags.pose_stamped("base", pose @ shift, at))
+        for topic, shift in (("/tcp", np.eye(4)), ("/goal", np.diag([-1.0, -1.0, 1.0, 1.0])))
+        for at, pose in zip(times, tour.flange(times), strict=True)
+    ]
+    elsewhere = bags.transforms(bags.transform("base", "tool0", np.eye(4), 0.0))
+    tf = [("/tf", "tf2_msgs/msg/TFMessage", 0.0, elsewhere)]
+    bag = write_bag(tmp_path / "bag", [*some, *moved, *tf])
+    result, recording = _imported(bag, tmp_path / "out", "--pose-topic", "/tcp")
+    assert "of /tcp in base" in _says(result, "poses are")
+    np.testing.assert_allclose(_poses(recording), tour.flange(_taken(some)), atol=1e-6)
+
+
+def test_a_ros_1_bag_with_transforms(tour: Tour, at_rest: list[Message], tmp_path: Path) -> None:
+    """Compressed pieces, ROS 1's headers and type names; pictures as they were."""
+    content = [*at_rest, *bags.tf_of(tour)]
+    lz4 = Ros1Writer.CompressionFormat.LZ4
+    bag = bags.write_ros1_bag(tmp_path / "ros1.bag", content, lz4)
+    result, recording = _imported(bag, tmp_path / "out")
+    assert "transforms from base to tool0" in _says(result, "poses are")
+    assert result["with_corners"] == result["with_pose"] == STOPS
+    np.testing.assert_allclose(_poses(recording), tour.flange(_taken(at_rest)), atol=1e-6)
+    first = at_rest[0][3]
+    pixels = recording.image(recording.frames[0])
+    np.testing.assert_array_equal(pixels, first.data.reshape(first.height, first.width))
 
 
 def _header(time_s: float) -> dict[str, Any]:

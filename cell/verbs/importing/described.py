@@ -25,6 +25,8 @@ class OfBag:
         Which pictures.
     clock_offset_s:
         To add to a picture's stamp.
+    pose:
+        Topic of the flange's poses.
     """
 
     image: str | None = None
@@ -33,6 +35,7 @@ class OfBag:
     flange: str | None = None
     take: Take | None = None
     clock_offset_s: float | None = None
+    pose: str | None = None
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,9 @@ class Contents:
     camera_info:
         The camera's own message, or None.
     transforms:
-        Of every transform topic.
+        Of every transform topic; a topic of poses is a frame under the topic's name.
+    pose_topics:
+        Names of those.
     joint_samples:
         Names, and (time, angles) under these names.
     description:
@@ -48,6 +50,7 @@ class Contents:
     picture_s: list[float] = field(default_factory=list)
     camera_info: Any = None
     transforms: Transforms = field(default_factory=Transforms)
+    pose_topics: tuple[str, ...] = ()
     joint_samples: dict[tuple[str, ...], list[tuple[float, Any]]] = field(default_factory=dict)
     description: str | None = None
     unstamped: int = 0
@@ -88,14 +91,16 @@ class Contents:
         return np.array(self.picture_s)
 
 
-def read_contents(bag: Bag, image: Topic, joint_topic: Topic | None) -> Contents:
+def read_contents(
+    bag: Bag, image: Topic, joint_topic: Topic | None, pose_topics: tuple[str, ...] = ()
+) -> Contents:
     """Everything but the pixels; raises `InputError` for a message that cannot be what it says."""
-    found = Contents(image)
+    found = Contents(image, pose_topics=pose_topics)
     info = topics.camera_info_topic(bag, image)
     description = topics.description_topic(bag)
     transforms = topics.transform_topics(bag)
     joints = None if joint_topic is None else joint_topic.name
-    wanted = {image.name, info, description, joints, *transforms} - {None}
+    wanted = {image.name, info, description, joints, *transforms, *pose_topics} - {None}
     messages = bag.messages({name for name in wanted if name})
     for count, (topic, received_ns, message) in enumerate(messages):
         if count >= limits.MESSAGES:
@@ -109,6 +114,8 @@ def read_contents(bag: Bag, image: Topic, joint_topic: Topic | None) -> Contents
             found.description = str(message.data)
         elif topic == joints:
             _add_joints(found, message, received_ns)
+        elif topic in pose_topics:
+            found.transforms.add_pose(message, topic, found.seconds(message.header, received_ns))
         else:
             for stamped in message.transforms:
                 still = topic.endswith("static")

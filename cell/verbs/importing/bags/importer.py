@@ -29,7 +29,7 @@ from cell.verbs.importing.bags.contents import Contents, read_contents
 from cell.verbs.importing.bags.pictures import picture
 from cell.verbs.importing.bags.robot import Robot, find_robot, no_poses
 from cell.verbs.importing.bags.stillness import choose, still
-from cell.verbs.importing.bags.topics import image_topic, joint_topic
+from cell.verbs.importing.bags.topics import image_topic, joint_topic, pose_topics
 from cell.verbs.importing.described import Described
 from cell.verbs.importing.outcome import Imported, checked, picture_check
 from cell.verbs.importing.pairing import TIME_BOUND_S
@@ -72,8 +72,9 @@ def import_bag(
     stated = described.bag
     with open_bag(source) as bag:
         image = image_topic(bag, stated.image)
-        contents = read_contents(bag, image, joint_topic(bag, stated.joints))
-        robot = find_robot(contents, described.robot, stated.base, stated.flange)
+        poses = tuple(pose_topics(bag, stated.pose))
+        contents = read_contents(bag, image, joint_topic(bag, stated.joints), poses)
+        robot = find_robot(contents, described.robot, stated.base, stated.flange, stated.pose)
         header = _header(source, described, contents, robot, _size(bag, contents))
         plan = _plan(bag, contents, robot, described, header.board.board())
         header = _import_record(header, robot, plan)

@@ -20,7 +20,7 @@ from calib.views import FloatArray
 from cell.errors import InputError
 from cell.verbs.importing.bags.contents import Contents
 from cell.verbs.importing.bags.tracks import Joints, away_s
-from cell.verbs.importing.bags.transforms import Way, way_between
+from cell.verbs.importing.bags.transforms import Way, way_between, way_of_topic
 
 _UR_ORDER = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 _BASES, _FLANGES = ("base", "base_link"), ("tool0", "flange")
@@ -83,21 +83,47 @@ class Robot:
 
 
 def find_robot(
-    contents: Contents, model: str | None, base: str | None, flange: str | None
+    contents: Contents,
+    model: str | None,
+    base: str | None,
+    flange: str | None,
+    pose: str | None = None,
 ) -> Robot:
     """What the bag, and the user, say of the arm; raises `InputError` for a wrong name."""
     notes: list[str] = []
-    way = way_between(contents.transforms, base, flange)
+    if pose is not None:
+        way: Way | None = way_of_topic(contents.transforms, pose, base)
+    else:
+        way = way_between(contents.transforms, base, flange)
     kinematics, description, names = _arm(contents, model, base, flange, notes)
     found = contents.joints(names)
     joints = None if found is None else found[1]
     if found is not None and names is None:
         joints = _in_order(found[0], found[1], notes)
-    if way is not None:
+    if way is None and kinematics is None and flange is None:
+        way = _only_pose_topic(contents, base)
+    if way is not None and way.flange in contents.pose_topics:
+        notes.append(
+            f"poses are those of {way.flange} in {way.base}, taken for the flange's; a tool that"
+            " is set at the controller may be in them"
+        )
+    elif way is not None:
         notes.append(f"poses are the transforms from {way.base} to {way.flange}")
     elif joints is not None and kinematics is not None:
         notes.append(f"poses are made of the joints by the kinematics of {kinematics.name}")
     return Robot(way, joints, kinematics, description, tuple(notes))
+
+
+def _only_pose_topic(contents: Contents, base: str | None) -> Way | None:
+    """Of several none can be meant without being named: goals are published as poses, too."""
+    if len(contents.pose_topics) > 1:
+        raise InputError(
+            "several topics have poses, and neither transforms nor joints state the flange's; say"
+            f" which with --pose-topic: {', '.join(contents.pose_topics)}"
+        )
+    return next(
+        (way_of_topic(contents.transforms, name, base) for name in contents.pose_topics), None
+    )
 
 
 def _arm(
@@ -145,6 +171,7 @@ def no_poses(robot: Robot, contents: Contents) -> str:
     frames = ", ".join(contents.transforms.frames[:20]) or "none"
     return (
         "no flange poses: the lens alone can be calibrated. Name the frames of the transforms with"
-        f" --base and --flange (the bag has {frames}), or the arm of its joints with --robot"
+        f" --base and --flange (the bag has {frames}), the topic of the flange's poses with"
+        " --pose-topic, or the arm of its joints with --robot"
         f" ({', '.join(sorted(MODELS)[:3])} ...)"
     )

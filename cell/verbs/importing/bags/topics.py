@@ -9,6 +9,7 @@ from cell.errors import InputError
 from cell.verbs.importing.bags.bag import IMAGE, PICTURES, Bag, Topic
 
 CAMERA_INFO, JOINTS = "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/JointState"
+POSES = "geometry_msgs/msg/PoseStamped"
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 TEXT = "std_msgs/msg/String"
 
@@ -63,6 +64,14 @@ def camera_info_topic(bag: Bag, image: Topic) -> str | None:
 def transform_topics(bag: Bag) -> list[str]:
     """Every topic of transforms between frames."""
     return [topic.name for topic in _of(bag, *TRANSFORMS)]
+
+
+def pose_topics(bag: Bag, stated: str | None) -> list[str]:
+    """Topics of poses that may be the flange's; raises `InputError` where the one named is none."""
+    able = _of(bag, POSES)
+    if stated is not None:
+        return [_stated(bag, stated, able, "--pose-topic").name]
+    return [topic.name for topic in able]
 
 
 def description_topic(bag: Bag) -> str | None:

@@ -29,15 +29,21 @@ class Transforms:
     def add(self, stamped: Any, time_s: float, *, still: bool) -> None:
         """Take one TransformStamped; raises `InputError` where it is no transform."""
         edge = (_name(stamped.header.frame_id), _name(stamped.child_frame_id))
-        place, turn = stamped.transform.translation, stamped.transform.rotation
-        numbers = np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w])
-        length = float(np.linalg.norm(numbers[3:]))
-        if not np.isfinite(numbers).all() or not 0.9 < length < 1.1:
-            raise InputError(f"the transform from {edge[0]} to {edge[1]} is no pose: {numbers}")
+        numbers = _numbers(edge, stamped.transform.translation, stamped.transform.rotation)
         if still:
             self.still[edge] = numbers
         else:
             self.moving.setdefault(edge, []).append((time_s, numbers))
+
+    def add_pose(self, stamped: Any, topic: str, time_s: float) -> None:
+        """Take one PoseStamped of a topic, whose name is the frame that has this pose."""
+        edge = (_name(stamped.header.frame_id) or _BASES[0], topic)
+        numbers = _numbers(edge, stamped.pose.position, stamped.pose.orientation)
+        self.moving.setdefault(edge, []).append((time_s, numbers))
+
+    def parents(self, child: str) -> list[str]:
+        """Frames in which a frame's pose was published."""
+        return sorted(parent for parent, below in (*self.still, *self.moving) if below == child)
 
     @property
     def frames(self) -> list[str]:
@@ -53,6 +59,15 @@ class Transforms:
             np.array([time for time, _ in samples]), np.array([n for _, n in samples])
         )
         return Track(times, _matrices(numbers))
+
+
+def _numbers(edge: tuple[str, str], place: Any, turn: Any) -> FloatArray:
+    """(7,) position in metres and quaternion, scalar last."""
+    numbers = np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w])
+    length = float(np.linalg.norm(numbers[3:]))
+    if not np.isfinite(numbers).all() or not 0.9 < length < 1.1:
+        raise InputError(f"the transform from {edge[0]} to {edge[1]} is no pose: {numbers}")
+    return numbers
 
 
 def _name(frame: str) -> str:
@@ -127,6 +142,25 @@ def way_between(found: Transforms, base: str | None, flange: str | None) -> Way 
     if base and flange and names:
         raise InputError(f"no transforms of the bag lead from {base} to {flange}")
     return None
+
+
+def way_of_topic(found: Transforms, topic: str, base: str | None) -> Way:
+    """The way that a topic of poses is, from the frame that they are in unless one is named.
+
+    Raises
+    ------
+    InputError
+        The topic's poses are in several frames, or nothing leads to them from the one named.
+    """
+    parents = found.parents(topic)
+    if len(parents) != 1:
+        raise InputError(
+            f"{topic}: its poses are in several frames ({', '.join(parents)}); record or filter"
+            " them so that they are in the robot's base"
+        )
+    way = way_between(found, base or parents[0], topic)
+    assert way is not None  # one edge, or refused there
+    return way
 
 
 def _way(found: Transforms, base: str, flange: str) -> Way | None:
