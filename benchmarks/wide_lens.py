@@ -29,9 +29,9 @@ from scipy.spatial.transform import Rotation
 from calib.calibration.joint_lens import deserved_terms
 from calib.calibration.lens_choice import chosen_lens
 from calib.calibration.pictures import Pictures
+from calib.chain.domain import off_axis_rad
 from calib.chain.optics import optics_row
 from calib.chain.projection import project
-from calib.chain.sight import off_axis_rad
 from calib.detection import detect
 from calib.solver.free_poses import fit_free_poses
 from calib.views import Board, FloatArray, Views

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from calib.calibration.pictures import FOLDS, Pictures
-from calib.chain.sight import invertible_rad
+from calib.chain.domain import invertible_rad
 from calib.solver.free_poses import FreePoseFit
 from calib.solver.joint import JointFit, fit_joint
 from calib.solver.unknowns import plain_optics, unknowns_of

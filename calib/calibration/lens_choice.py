@@ -19,7 +19,8 @@ from calib.calibration.joint_lens import WORTH, deserved_terms
 from calib.calibration.pictures import FOLDS, Pictures
 from calib.calibration.result import Rejection
 from calib.calibration.wide_start import wide_start
-from calib.chain.sight import invertible_rad, unproject
+from calib.chain.domain import invertible_rad
+from calib.chain.sight import unproject
 from calib.errors import CalibrationError
 from calib.solver.unknowns import plain_optics
 from calib.views import BoolArray, FloatArray, Views

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.chain.domain import off_axis_rad
 from calib.chain.model import Errors, evaluate
 from calib.chain.optics import COLUMN
-from calib.chain.sight import off_axis_rad
 from calib.solver.free_poses import FreePoseFit, fit_free_poses
 from calib.solver.joint import JointFit
 from calib.solver.unknowns import plain_optics

@@ -12,8 +12,8 @@ from calib.calibration.caution import Caution
 from calib.calibration.cross_validation import CrossValidation
 from calib.calibration.identifiability import Weakness
 from calib.calibration.uncertainty import UncertaintyMap
+from calib.chain.domain import invertible_rad, off_axis_rad
 from calib.chain.optics import COLUMN
-from calib.chain.sight import invertible_rad, off_axis_rad
 from calib.handeye import HandEye, chain
 from calib.notebook import Row, Shown, axes_of
 from calib.paper.focus_law import FocusLaw, FocusLawChoice, Parameter

@@ -13,9 +13,10 @@ import numpy as np
 
 from calib.calibration.frames import CORNERS_NEEDED
 from calib.chain import rigid
+from calib.chain.domain import off_axis_rad
 from calib.chain.optics import COLUMN, optics_row
 from calib.chain.projection import project
-from calib.chain.sight import off_axis_rad, unproject
+from calib.chain.sight import unproject
 from calib.errors import CalibrationError
 from calib.paper.extrinsics import board_poses
 from calib.paper.homography import robust_homographies
@@ -50,7 +51,7 @@ def wide_start(views: Views, wanted: BoolArray) -> tuple[FloatArray, FloatArray]
         row = _lens(views, float(half))
         poses = wide_poses(row, views, wanted)
         known = np.isfinite(poses).all(axis=(1, 2))
-        if 2 * known.sum() < wanted.sum():
+        if not known.any() or 2 * known.sum() < wanted.sum():
             continue
         rows = np.tile(row, (int(known.sum()), 1))
         predicted = project(rows, poses[known], views.board.corners_m)

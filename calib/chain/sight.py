@@ -9,59 +9,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from calib.chain.domain import distorted_radius, invertible_rad, off_axis_rad
 from calib.chain.optics import COLUMN
 from calib.chain.projection import project as project_anything
 from calib.chain.projection import project_with_jacobians
 from calib.views import BoolArray, FloatArray
 
-_WIDEST_PERSPECTIVE_RAD = np.radians(89.9)
 _STEPS = 600
+_BACK_INSIDE = 0.98
+"""Of the domain: where a line of sight starts, or goes on, that the lens's edge would throw out.
+From inside Newton's method nears a direction at the edge step by step; from the edge itself, where
+nothing grows, it leaps across the fold."""
 _ITERATIONS = 30
 _SETTLED_RAD = 1e-12
 _CENTRAL = ("pupil_m_rad2", "window_m", *(n for n in COLUMN if n.startswith("sweep")))
 """What moves a line of sight sideways or with the board: a direction alone has none of it."""
-
-
-def distorted_radius(optics: FloatArray, angle_rad: FloatArray) -> FloatArray:
-    """(Q,) distance from the principal point, in focal lengths, of directions off the axis.
-
-    By the radial distortion alone; negative or huge where that has lost its sense.
-    """
-    k1, k2, k3, k4, k5, k6 = (optics[COLUMN[f"k{i}"]] for i in range(1, 7))
-    value = np.polynomial.polynomial.polyval
-    if optics[COLUMN["equidistant"]]:
-        return np.asarray(angle_rad * value(angle_rad**2, (1.0, k1, k2, k3, k4)))
-    r = np.tan(angle_rad)
-    below = value(r**2, (1.0, k4, k5, k6))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(below > 0, r * value(r**2, (1.0, k1, k2, k3)) / below, -np.inf)
-
-
-def invertible_rad(optics: FloatArray) -> float:
-    """Angle off the axis up to which (K,) optics give every direction a pixel of its own.
-
-    Where the radial distortion never folds: just short of a right angle for a perspective camera,
-    half a turn for an equidistant one. The small terms that are not radial are not looked at.
-    """
-    angle = np.linspace(0.0, _widest_rad(optics), _STEPS)
-    for _ in range(3):  # each time between the two steps where it folds
-        with np.errstate(invalid="ignore"):  # beyond a pole
-            grows = np.diff(distorted_radius(optics, angle)) > 0
-        if grows.all():
-            return float(angle[-1])
-        fold = int((~grows).argmax())
-        angle = np.linspace(angle[max(fold - 1, 0)], angle[fold + 1], _STEPS)
-    return float(angle[fold])
-
-
-def _widest_rad(optics: FloatArray) -> float:
-    return float(np.pi if optics[COLUMN["equidistant"]] else _WIDEST_PERSPECTIVE_RAD)
-
-
-def off_axis_rad(points_m: FloatArray) -> FloatArray:
-    """(...) angles of (..., 3) points in the camera's frame with its axis."""
-    aside = np.hypot(points_m[..., 0], points_m[..., 1])
-    return np.asarray(np.arctan2(aside, points_m[..., 2]))
 
 
 def project(optics: FloatArray, camera_from_board: FloatArray, points_m: FloatArray) -> FloatArray:
@@ -123,7 +85,7 @@ def unproject(optics: FloatArray, pixels_px: FloatArray) -> FloatArray:
             length = np.linalg.norm(step, axis=1)
             step *= np.minimum(1.0, 0.2 / np.maximum(length, 1e-300))[:, None]
             sight += step
-            sight /= np.linalg.norm(sight, axis=1, keepdims=True)
+            sight = _inside(sight / np.linalg.norm(sight, axis=1, keepdims=True), widest)
         settled = length < _SETTLED_RAD
         if settled.all():
             break
@@ -148,12 +110,25 @@ def _solved(by_sight: FloatArray, miss: FloatArray) -> FloatArray:
 
 
 def _radially(row: FloatArray, pixels_px: FloatArray, widest_rad: float) -> FloatArray:
-    """(Q, 3) directions by the radial distortion alone; those beyond the domain at its edge."""
+    """(Q, 3) directions by the radial distortion alone; those beyond the domain near its edge."""
     alpha, beta, skew, u0, v0 = row[:5]
     y = (pixels_px[:, 1] - v0) / beta
     x = (pixels_px[:, 0] - u0 - skew * y) / alpha
     angles = np.linspace(0.0, widest_rad * (1.0 - 1e-9), _STEPS)
     angle = np.interp(np.hypot(x, y), distorted_radius(row, angles), angles)
-    around = np.arctan2(y, x)
-    aside = np.sin(angle)[:, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
-    return np.column_stack([aside, np.cos(angle)])
+    return _ray(np.minimum(angle, _BACK_INSIDE * widest_rad), np.arctan2(y, x))
+
+
+def _inside(sight: FloatArray, widest_rad: float) -> FloatArray:
+    """(Q, 3) the same directions, those that left the domain put back."""
+    beyond = off_axis_rad(sight) > widest_rad
+    around = np.arctan2(sight[:, 1], sight[:, 0])
+    return np.where(
+        beyond[:, None], _ray(np.full(len(sight), _BACK_INSIDE * widest_rad), around), sight
+    )
+
+
+def _ray(angle_rad: FloatArray, around_rad: FloatArray) -> FloatArray:
+    """(Q, 3) directions that far off the axis."""
+    aside = np.stack([np.cos(around_rad), np.sin(around_rad)], axis=1)
+    return np.column_stack([np.sin(angle_rad)[:, None] * aside, np.cos(angle_rad)])

@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from calib.chain.domain import invertible_rad, off_axis_rad
 from calib.chain.optics import optics_row
-from calib.chain.sight import invertible_rad, off_axis_rad, project, unproject
+from calib.chain.sight import project, unproject
 
 IDEAL = {"alpha_px": 400.0, "beta_px": 410.0, "u0_px": 640.0, "v0_px": 480.0, "height_px": 960.0}
 LENSES = {

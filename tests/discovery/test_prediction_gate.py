@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from calib.chain.effects import make_effect
 from calib.chain.laws.arm_field import coordinates, present_field
@@ -40,7 +41,9 @@ def test_numbers_that_only_fit_are_dropped_and_it_is_reported():
     assert len(dropped) == 1
     assert str(dropped[0]).startswith("link_geometry fitted these frames but was dropped")
     assert dropped[0].with_px > dropped[0].without_px
-    assert not after.worse_than(before)
+    # the plain cell again, but for where the search for its noise came to rest
+    assert after.left_out.sum() == pytest.approx(before.left_out.sum(), rel=1e-3)
+    assert after.held_out == pytest.approx(before.held_out, rel=1e-2)
 
 
 def test_of_two_the_one_that_predicts_worse_goes_and_the_true_one_stays():

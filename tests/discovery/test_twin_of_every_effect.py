@@ -41,7 +41,7 @@ def log_for(effect: Effect) -> Views:
 
 
 def truth(effect: Effect) -> Present:
-    """Usual amounts with mixed signs; shapes in the middle of those worth trying."""
+    """Usual amounts with mixed signs, or a smooth curve of them; shapes in the middle."""
     rng = np.random.default_rng(len(effect.label))
     shapes = list(effect.candidates(log_for(effect)))
     values = effect.values(shapes[len(shapes) // 2])
@@ -49,6 +49,10 @@ def truth(effect: Effect) -> Present:
         if parameter.role == "amount" and parameter.identifiable:
             sign = rng.choice([-1.0, 1.0]) if parameter.low < 0.0 else 1.0
             values[k] = sign * parameter.typical
+    if effect.roughness:  # what a curve may bend by from node to node has a prior
+        nodes = [k for k, p in enumerate(effect.parameters) if p.role == "amount"]
+        along = np.arange(len(nodes))
+        values[nodes] = values[nodes[0]] * (len(nodes) - along) * (1.0 - 0.05 * along)
     return Present(effect, values)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.chain.sight import distorted_radius, invertible_rad
+from calib.chain.domain import distorted_radius, invertible_rad
 from cell.verbs.export.camera import Camera
 
 

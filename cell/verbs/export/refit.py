@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
+from calib.chain.domain import distorted_radius, invertible_rad
 from calib.chain.projection import project
-from calib.chain.sight import distorted_radius, invertible_rad
 from calib.views import FloatArray
 from cell.storage.files.calibration_source import DISTORTION
 from cell.verbs.export.camera import FISHEYE, Camera
