@@ -10,6 +10,7 @@ from calib.calibration.caution import Caution
 from calib.calibration.cross_validation import CrossValidation
 from calib.calibration.frames import COPY
 from calib.calibration.result import Rejection, RobotReference, Solution
+from calib.calibration.unseen_edge import unseen_edge
 from calib.calibration.verdict_messages import why
 from calib.errors import CalibrationError
 from calib.views import FloatArray, Views
@@ -44,6 +45,7 @@ def cautions(
         *_without_robot(views, fault),
         *([] if robot is None else _doubtful(views, solutions, robot)),
         *([] if robot is None else _outliers(robot)),
+        *unseen_edge(views),
         *_rejected(rejected),
         *_validation(validation),
     ]

@@ -118,6 +118,7 @@ def test_a_board_described_without_markers_is_rejected():
         ((4, 4), r"markers 0 to 16 are in sight, and the described board of 5 x 5 squares .* more"),
         ((6, 3), "has them in other places: it has other numbers of squares"),
         ((4, 6), "has them in other places: it has other numbers of squares"),
+        ((8, 6), "has them in other places: it has other numbers of squares"),
     ],
 )
 def test_a_board_other_than_described_is_refused_with_what_was_seen(described, message):
@@ -126,6 +127,14 @@ def test_a_board_other_than_described_is_refused_with_what_was_seen(described, m
     found = detect(photograph(image), Board("charuco", rows, cols, 0.03, 0.021, "DICT_5X5_100"))
     assert isinstance(found, Rejected)
     assert re.search(message, found.reason), found.reason
+
+
+def test_a_board_of_fewer_rows_than_described_lacks_them():
+    image, truth = photographed(1.0)
+    found = detect(photograph(image), Board("charuco", 8, 4, 0.03, 0.021, "DICT_5X5_100"))
+    corners = found.corners_px.reshape(8, 4, 2)
+    assert corners[:6].reshape(-1, 2) == pytest.approx(truth, abs=0.2)
+    assert np.isnan(corners[6:]).all()
 
 
 def test_a_board_whose_markers_are_numbered_from_another_one_is_refused():
