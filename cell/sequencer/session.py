@@ -18,8 +18,10 @@ from cell.sequencer.sequencer import Devices, Sequencer
 from cell.sequencer.states import Finish, RunResult
 from cell.sequencer.stop import StopRequest, signals_ask
 from cell.sequencer.watcher import Watcher
+from cell.storage.files.camera_file import CameraFile
 from cell.storage.files.cell_file import SimulatedRobot
 from cell.storage.files.plan_file import Plan
+from cell.storage.files.provenance import made_by
 from cell.storage.recording import FrameRecord, Header, RecordingWriter
 from cell.storage.recording.corners import FILE_NAME as DETECTIONS
 
@@ -86,7 +88,9 @@ Begun = tuple[RecordingWriter, Journal, Progress, float]
 
 
 def _begin(plan: Plan, folder: Path, simulated: bool, devices: Devices) -> Begun:
-    writer = RecordingWriter.create(folder, header_of(plan, simulated=simulated))
+    header = header_of(plan, simulated=simulated)
+    begun = header.model_copy(update={"created": made_by()["created"]})
+    writer = RecordingWriter.create(folder, begun)
     journal = Journal(folder)
     journal.write(
         "start",
@@ -148,6 +152,12 @@ def recorded_robot(robot: SimulatedRobot) -> dict[str, Any]:
     return settings
 
 
+def _stated_serial(camera: CameraFile) -> dict[str, str]:
+    """The camera's serial number where the cell file picks it out by that."""
+    serial = getattr(camera, "serial", None)
+    return {} if serial is None else {"serial": serial}
+
+
 def header_of(plan: Plan, *, simulated: bool, images: bool = True) -> Header:
     """The `recording.yaml` of a plan's recording."""
     cell = plan.cell
@@ -162,7 +172,8 @@ def header_of(plan: Plan, *, simulated: bool, images: bool = True) -> Header:
                 "height": cell.camera.height,
                 "pixel_size_um": cell.camera.pixel_size_um,
                 "focus": cell.camera.focus,
-            },
+            }
+            | _stated_serial(cell.camera),
             "board": cell.board.model_dump(),
             "mount": cell.mount,
             "capture": {"mode": "stop"},

@@ -9,6 +9,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -20,11 +22,15 @@ from typer.testing import CliRunner
 from cell.cli.app import app
 from cell.cli.page_option import with_addresses
 from cell.errors import EXIT_OPERATOR, InputError
+from cell.sequencer.session import header_of
 from cell.sequencer.states import Finish, RunResult, State
+from cell.storage.files.camera_file import GenicamCamera
+from cell.storage.files.provenance import made_by
 from cell.storage.recording import read_recording
 from cell.views.page.address import DEFAULT, Address, is_address
 from cell.views.page.application import MOST_STREAMS
 from cell.views.page.live_run import LiveRun
+from cell.views.page.parts import run_part
 from cell.views.page.picture import jpeg
 from cell.views.running_estimate.estimate import Estimate
 from tests.page.bench import ask, checked, connect, events, plan_of, press, served, status
@@ -174,6 +180,9 @@ def test_a_new_browser_hears_everything_at_once(live: LiveRun, url: str, tmp_pat
     wanted = {"run", "now", "frame", "camera", "coverage", "estimate", "messages"}
     shown = events(url, wanted)
     assert shown["run"]["simulated"] is True
+    begun = f"Begun {datetime.now().astimezone():%Y-%m-%d}"
+    assert str(shown["run"]["provenance"]).startswith(begun)
+    assert f"by {made_by()['program']}; camera " in str(shown["run"]["provenance"])
     assert shown["now"]["state"] == "moving"
     assert shown["now"]["left_s"] == 95.0
     assert len(shown["frame"]["corners"]) == 70  # type: ignore[arg-type]
@@ -181,6 +190,19 @@ def test_a_new_browser_hears_everything_at_once(live: LiveRun, url: str, tmp_pat
     assert shown["camera"]["values"] == [{"name": "exposure", "value": "0.01 s"}]
     assert shown["estimate"]["history"] == [[9, 0.3]]
     assert shown["messages"]["lines"][0]["words"] == "frame 2 logged"  # type: ignore[index]
+
+
+def test_the_page_names_the_devices_as_the_report_does(tmp_path: Path) -> None:
+    plan = plan_of(tmp_path)
+    assert plan.cell.robot.model
+    options = {"driver": "genicam", "producer": Path("grab.cti"), "serial": "E0417"}
+    known = plan.cell.camera.model_dump(include={"model", "width", "height", "focus"})
+    camera = GenicamCamera.model_validate(known | options)
+    named = replace(plan, cell=plan.cell.model_copy(update={"camera": camera}))
+    text = run_part(named, simulated=False, folder="runs/monday")["provenance"]
+    assert f"camera {camera.model or 'of unknown model'} (serial E0417)" in text
+    assert f"robot {plan.cell.robot.model} (serial not known)" in text
+    assert header_of(named, simulated=False).as_mapping()["camera"]["serial"] == "E0417"
 
 
 def test_coverage_counts_planned_and_seen(live: LiveRun, tmp_path: Path) -> None:

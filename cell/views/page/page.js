@@ -79,6 +79,7 @@ function watch() {
 function showRun(part) {
   put("name", part.name);
   put("devices", [part.arm, part.camera, `recording ${part.folder}`].filter(Boolean).join(", "));
+  put("provenance", part.provenance);
   at("simulated").hidden = !part.simulated;
 }
 

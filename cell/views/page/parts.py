@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from cell.sequencer.session import header_of
 from cell.sequencer.watcher import Checked
 from cell.storage.files.plan_file import Plan, Until
+from cell.storage.files.provenance import provenance
+from cell.views.provenance_text import run_provenance_text
 from cell.views.running_estimate.estimate import Estimate
 from drivers.camera import Frame
 
@@ -32,6 +35,9 @@ def run_part(plan: Plan, *, simulated: bool, folder: str) -> dict[str, Any]:
         "camera": cell.camera.model,
         "simulated": simulated,
         "folder": folder,
+        "provenance": run_provenance_text(
+            provenance(header_of(plan, simulated=simulated).as_mapping())
+        ),
         "goal_px": plan.file.until.alpha_sigma_px if plan.file.until else None,
     }
 
