@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,13 @@ import pytest
 
 from calib.chain.kinematics import MODELS, arm
 from cell.devices.nominal_cell import USUAL_NOISE, nominal
+from cell.devices.planned_camera import PlannedCamera
 from cell.sequencer.bounded import check_bounded
 from cell.storage.files.cell_file import read_cell
 from cell.verbs.init.answers import HOMES_DEG, Answers
 from cell.verbs.init.cell_text import cell_of
+from cell.verbs.plan.candidates import varied
+from cell.verbs.plan.reach import planning_guard, reachable
 from cell.verbs.plan.shortfall import why_not
 from drivers.errors import SafetyError
 from tests.cell.test_cli import Cell
@@ -65,6 +69,20 @@ def test_the_board_lies_before_the_camera_at_home(model: str, mount: str) -> Non
     middle = camera_from_board @ [9 * 0.0125, 6 * 0.0125, 0.0, 1.0]
     near, far = made.layout.distances_m
     assert middle[:3] == pytest.approx([0.0, 0.0, (near + far) / 2], abs=1e-5)
+
+
+@pytest.mark.parametrize("mount", ["eye_in_hand", "eye_to_hand"])
+@pytest.mark.parametrize("model", MODELS)
+def test_every_arm_stands_free_at_home_and_reaches_views(model: str, mount: str) -> None:
+    made = cell_of(Answers(board=CHESS, model=model, mount=mount))  # type: ignore[arg-type]
+    assert made.layout is not None
+    guard = planning_guard(made)
+    near = guard.scene.at(np.radians(made.layout.home_deg))
+    assert near is not None
+    assert near.distance_m > made.clearance_m, f"{near.first} to {near.second}"
+    tries = islice(varied(PlannedCamera.of(made), made.layout.distances_m, seed=1), 30)
+    found = list(islice(reachable("varied", tries, made, guard), 3))
+    assert len(found) == 3, why_not(made)
 
 
 def test_a_real_arm_is_asked_for_what_it_could_run_into(cell: Cell, tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def cell_of(answers: Answers) -> CellFile:
         "board": dict(answers.board),
         "mount": answers.mount,
         "layout": {
-            "mounted": _pose(answers.camera_at),
+            "mounted": _pose(answers.mounted),
             "fixed": _pose(answers.board_at)
             if answers.board_at is not None
             else _seen_from_home(answers, home, away_m),
@@ -96,7 +96,7 @@ def _home_and_distance(
     lowest = min(answers.workspace[2], answers.workspace[5])
     away = 0.0
     for home in homes:
-        camera = _flange(answers.model, home) * _transform(answers.camera_at)
+        camera = _flange(answers.model, home) * _transform(answers.mounted)
         away = float(camera.translation[2]) - lowest
         if away >= near or answers.board_at is not None:
             return home, min(middle, away)
@@ -204,7 +204,7 @@ def _seen_from_home(answers: Answers, home: tuple[float, ...], distance_m: float
     flange = _flange(answers.model, home)
     middle = _board(answers).corners_m.mean(axis=0)
     camera_from_board = RigidTransform.from_translation(np.array([0.0, 0.0, distance_m]) - middle)
-    mounted = flange * _transform(answers.camera_at)
+    mounted = flange * _transform(answers.mounted)
     hand = answers.mount == "eye_in_hand"
     fixed = mounted * (camera_from_board if hand else camera_from_board.inv())
     return Pose.of(fixed).model_dump(mode="json", exclude_none=True)
