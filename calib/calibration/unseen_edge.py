@@ -44,7 +44,7 @@ def _beyond(views: Views, name: str, lines: FloatArray, places: FloatArray) -> I
 
     `lines` (N, L, K, 2) are the corners of L lines that stand at `places` (L,) of the board.
     """
-    seen = np.flatnonzero(np.isfinite(lines).all(axis=3).any(axis=(0, 2)))
+    seen = np.flatnonzero(np.any(np.isfinite(lines).all(axis=3), axis=(0, 2)))
     if len(seen) < 2:
         return
     first, last = int(seen[0]), int(seen[-1])
