@@ -7,17 +7,11 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, PositiveFloat
 
 from cell.storage.files.camera_numbers import CameraNumbers
-from cell.storage.files.result_part import ResultPart
+from cell.storage.files.provenance_part import DevicePart, OriginPart
+from cell.storage.files.result_part import LeftOutPart, ResultPart
 
 Vector = tuple[float, float, float]
 Sigma = Annotated[float, Field(ge=0)]
-
-
-class RejectedFrame(ResultPart):
-    """A frame left out."""
-
-    frame: int
-    reason: str
 
 
 class ScaleFactorPart(ResultPart):
@@ -171,11 +165,9 @@ class TransformPart(ResultPart):
     sigma_r_rad: Vector
 
 
-class RobotPart(ResultPart):
+class RobotPart(DevicePart):
     """Which robot, and what the fit with its poses found; null where there was no such fit."""
 
-    model: str | None = None
-    serial: str | None = None
     mount: Literal["eye_in_hand", "eye_to_hand"] | None = None
     source: Literal["joint", "hand_eye"] | None = None
     focus_law: str | None = None
@@ -185,13 +177,6 @@ class RobotPart(ResultPart):
     corner_sigma_px: Sigma | None = None
     outliers: tuple[int, ...] = ()
     """Frames whose logged pose disagrees with their picture."""
-
-
-class CameraPart(ResultPart):
-    """Which camera, as far as the recording states."""
-
-    model: str | None = None
-    serial: str | None = None
 
 
 class WarningPart(ResultPart):
@@ -330,19 +315,13 @@ class CornersLeftOut(ResultPart):
     """Counted row by row from the board's first corner."""
 
 
-class CalibrationFile(ResultPart):
+class CalibrationFile(OriginPart):
     """The whole of `calibration.json`; metres, radians, pixels."""
 
     model_config = ConfigDict(populate_by_name=True)
 
     schema_: Literal["cell.calibration/1"] = Field(alias="schema")
     recording: str
-    recorded: str | None = None
-    """When the recording was begun, as it says itself."""
-    created: str | None = None
-    """When this calibration was made, ISO 8601 with its zone."""
-    program: str | None = None
-    camera: CameraPart = CameraPart()
     answer: AnswerPart | None = None
     """What the report's first screen and the terminal say."""
     warnings: tuple[WarningPart, ...] = ()
@@ -354,7 +333,7 @@ class CalibrationFile(ResultPart):
     distance_range_m: tuple[PositiveFloat, PositiveFloat] | None = None
     """Nearest and farthest board centre in the frames used."""
     frames_used: tuple[int, ...]
-    frames_rejected: tuple[RejectedFrame, ...]
+    frames_rejected: tuple[LeftOutPart, ...]
     corners_left_out: tuple[CornersLeftOut, ...] = ()
     scale_factors: tuple[ScaleFactorPart, ...]
     zones: ZonesPart | None

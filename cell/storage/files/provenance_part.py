@@ -12,7 +12,7 @@ class DevicePart(ResultPart):
     serial: str | None = None
 
 
-class ProvenancePart(ResultPart):
+class OriginPart(ResultPart):
     """The keys that every result file has in common."""
 
     recorded: str | None = None
@@ -22,4 +22,9 @@ class ProvenancePart(ResultPart):
     program: str | None = None
     """Which program made it, with its version."""
     camera: DevicePart = DevicePart()
+
+
+class ProvenancePart(OriginPart):
+    """The same, where nothing more is said of the robot."""
+
     robot: DevicePart = DevicePart()

@@ -11,3 +11,10 @@ class ResultPart(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False
     )
+
+
+class LeftOutPart(ResultPart):
+    """A frame left out."""
+
+    frame: int
+    reason: str

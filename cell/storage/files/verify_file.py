@@ -7,19 +7,12 @@ from typing import Annotated, Final, Literal
 from pydantic import ConfigDict, Field, PositiveFloat
 
 from cell.storage.files.provenance_part import ProvenancePart
-from cell.storage.files.result_part import ResultPart
+from cell.storage.files.result_part import LeftOutPart, ResultPart
 
 SCHEMA: Final = "cell.verify/1"
 Probability = Annotated[float, Field(ge=0, le=1)]
 NotNegative = Annotated[float, Field(ge=0)]
 Vector = tuple[float, float, float]
-
-
-class LeftOutPart(ResultPart):
-    """A frame left out."""
-
-    frame: int
-    reason: str
 
 
 class MountPart(ResultPart):

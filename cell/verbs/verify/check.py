@@ -12,6 +12,7 @@ from calib.errors import CalibrationError
 from calib.paper.focus_law import LAWS, law_scale_px
 from calib.views import FloatArray, Views
 from cell.errors import InputError
+from cell.storage.files.result_part import LeftOutPart
 from cell.storage.files.verify_file import (
     SCHEMA,
     AlphaPart,
@@ -19,7 +20,6 @@ from cell.storage.files.verify_file import (
     DistancePart,
     FramePart,
     ImagePart,
-    LeftOutPart,
     LengthPart,
     MountPart,
     NoisePart,
