@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from benches import (
+    PATIENT_UR,
     UR_FAR,
     UR_HOME,
     at_speed,
@@ -82,7 +83,7 @@ def test_the_peer_overlooks_what_a_client_writes_without_registers_of_its_own():
 
 
 def test_a_program_that_is_not_ours_is_left_running():
-    with ur_moving() as (_, controller, sim):
+    with ur_moving(**PATIENT_UR) as (_, controller, sim):
         with pytest.raises(DeviceRefused, match="program is running"):
             URArm(controller.address).connect()
         assert truly_moving(sim)
@@ -103,7 +104,7 @@ def test_nobody_there_is_reported_as_such():
 
 def test_every_reading_is_of_one_instant_even_on_the_way():
     forward = kinematics_of("ur5e").forward
-    with ur_moving() as (arm, controller, _):
+    with ur_moving(**PATIENT_UR) as (arm, controller, _):
         controller.tcp_offset = (0.0, 0.05, 0.2, 0.4, 0.0, 0.0)
         for _ in range(50):
             state = arm.state()
@@ -115,7 +116,7 @@ def test_every_reading_is_of_one_instant_even_on_the_way():
 
 
 def test_the_raw_packet_is_kept_for_the_log():
-    with ur_moving() as (arm, controller, _):
+    with ur_moving(**PATIENT_UR) as (arm, controller, _):
         state = arm.state()
         offset, tcp = state.raw["tcp_offset"], state.raw["actual_TCP_pose"]
         assert offset == controller.tcp_offset
@@ -126,7 +127,7 @@ def test_the_raw_packet_is_kept_for_the_log():
 
 
 def test_the_pose_after_a_move_is_of_after_the_move():
-    with ur_moving() as (arm, _, sim):
+    with ur_moving(**PATIENT_UR) as (arm, _, sim):
         arm.stop()
         wait_steady(arm)
         for goal in (UR_HOME, tuple(angle + 0.1 for angle in UR_HOME)):

@@ -269,7 +269,7 @@ def test_a_protective_stop_ends_the_program_so_that_unlocking_does_not_drive_on(
 
 def test_a_protective_stop_left_paused_would_have_driven_on():
     # the hazard itself, so that the test above means something
-    with ur_moving() as (arm, controller, sim):
+    with ur_moving(**PATIENT_UR) as (arm, controller, sim):
         arm._supervisor._closing.set()
         arm._supervisor._thread.join()
         controller.protective_stop()
