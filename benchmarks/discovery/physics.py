@@ -96,20 +96,14 @@ def _base_tilt(s: State, k: float) -> None:
 
 
 def _bloom(s: State, k: float) -> None:
-    px = k * 90.0 * s.log["exposure_s"]
-
-    def grow(pixels: Array) -> Array:
-        middle = pixels.mean(axis=1, keepdims=True)
-        out = pixels - middle
-        far = np.linalg.norm(out, axis=2).max(axis=1)
-        return np.asarray(middle + out * (1 + px / far)[:, None, None])
-
-    s.picture.append(grow)
+    _marks_grow(s, k * 90.0 * s.log["exposure_s"])
 
 
 def _bloom_with_gain(s: State, k: float) -> None:
-    px = k * 0.08 * s.log["gain_db"]
+    _marks_grow(s, k * 0.08 * s.log["gain_db"])
 
+
+def _marks_grow(s: State, px: Array) -> None:
     def grow(pixels: Array) -> Array:
         middle = pixels.mean(axis=1, keepdims=True)
         out = pixels - middle

@@ -233,10 +233,7 @@ def _shown_at(
 
 def _facing(part: Board, sight: FloatArray, distance_m: float) -> FloatArray:
     """(G, 4, 4) of the part's middle at a distance along (G, 3) lines of sight, square to them."""
-    aside = np.linalg.norm(sight[:, :2], axis=1)
-    axis = np.column_stack([-sight[:, 1], sight[:, 0], np.zeros(len(sight))])
-    angle = np.arctan2(aside, sight[:, 2])
-    turned = rigid.compose(axis * (angle / np.maximum(aside, 1e-12))[:, None], np.zeros_like(sight))
+    turned = rigid.turn_from_axis(sight)
     turned[:, :3, 3] = distance_m * sight - turned[:, :3, :3] @ part.corners_m.mean(axis=0)
     return turned
 

@@ -89,8 +89,8 @@ def wide_poses(row: FloatArray, views: Views, wanted: BoolArray) -> FloatArray:
     poses = np.full((len(views), 4, 4), np.nan)
     if not known.any():
         return poses
-    ahead = _turns_ahead(np.nanmean(sight[known], axis=1))
-    turned = sight[known] @ np.swapaxes(ahead[:, :3, :3], 1, 2)
+    from_ahead = rigid.turn_from_axis(np.nanmean(sight[known], axis=1))
+    turned = sight[known] @ from_ahead[:, :3, :3]
     with np.errstate(invalid="ignore", divide="ignore"):
         near = off_axis_rad(turned) < _FLAT_RAD
         flat = np.where(near[..., None], turned[..., :2] / turned[..., 2:], np.nan)
@@ -98,14 +98,5 @@ def wide_poses(row: FloatArray, views: Views, wanted: BoolArray) -> FloatArray:
     homographies, _, _ = robust_homographies(views.board.corners_m[:, :2], focal * flat)
     found = np.isfinite(homographies).all(axis=(1, 2))
     seen = board_poses(homographies[found], np.diag([focal, focal, 1.0]))
-    poses[np.flatnonzero(known)[found]] = rigid.product(rigid.inverse(ahead[found]), seen)
+    poses[np.flatnonzero(known)[found]] = rigid.product(from_ahead[found], seen)
     return poses
-
-
-def _turns_ahead(sight: FloatArray) -> FloatArray:
-    """(N, 4, 4) rotations that bring (N, 3) directions onto the axis."""
-    aside = np.linalg.norm(sight[:, :2], axis=1)
-    axis = np.column_stack([sight[:, 1], -sight[:, 0], np.zeros(len(sight))])
-    angle = np.arctan2(aside, sight[:, 2])
-    vectors = axis * (angle / np.maximum(aside, 1e-12))[:, None]
-    return rigid.compose(vectors, np.zeros_like(vectors))

@@ -134,6 +134,15 @@ def compose(rotvec_rad: FloatArray, translation_m: FloatArray) -> FloatArray:
     return out
 
 
+def turn_from_axis(direction: FloatArray) -> FloatArray:
+    """(N, 4, 4) shortest rotations that bring the z axis onto (N, 3) directions of any length."""
+    aside = np.linalg.norm(direction[:, :2], axis=1)
+    axis = np.column_stack([-direction[:, 1], direction[:, 0], np.zeros(len(direction))])
+    angle = np.arctan2(aside, direction[:, 2])
+    turn_rad = axis * (angle / np.maximum(aside, 1e-12))[:, None]
+    return compose(turn_rad, np.zeros_like(turn_rad))
+
+
 def from_vector(increment: FloatArray) -> FloatArray:
     """(..., 4, 4) transforms from (..., 6) increments: metres x, y, z, then a rotation vector."""
     return compose(increment[..., 3:], increment[..., :3])

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
-import numpy as np
-
 from calib.chain.effect import Effect, Parameter
 from calib.chain.state import ChainState
-from calib.views import FloatArray, Views
+from calib.chain.warming import AT_TEMPERATURE, temperature_candidates, temperature_rise
+from calib.views import FloatArray
 
 
 def _act(values: FloatArray, state: ChainState) -> None:
-    growth = 1.0 + values[0] * np.nan_to_num(state.views.temperature_c - values[1])
+    growth = 1.0 + values[0] * temperature_rise(values[1], state.views)
     state.column("alpha_px")[:] *= growth
     state.column("beta_px")[:] *= growth
-
-
-def _candidates(views: Views) -> Sequence[Mapping[str, float]]:
-    return ({"at_temperature_c": float(np.nanmean(views.temperature_c))},)
 
 
 EFFECT = Effect(
@@ -33,7 +26,7 @@ EFFECT = Effect(
     ),
     parameters=(
         Parameter("relative_per_K", "1/K", 3e-5, -5e-3, 5e-3),
-        Parameter("at_temperature_c", "degC", 25.0, -100.0, 200.0, role="setting"),
+        AT_TEMPERATURE,
     ),
     act=_act,
     needs=("temperature_c",),
@@ -41,5 +34,5 @@ EFFECT = Effect(
     confounded_with=("thermal_mount_drift",),
     acts_along=tuple(("focal_length", along) for along in ("temperature", "time", "order")),
     remedy="Keep the camera at one temperature, or log it and let the twin correct.",
-    candidates=_candidates,
+    candidates=temperature_candidates,
 )

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
 
 from calib.chain import rigid
 from calib.chain.effect import Effect, Parameter
 from calib.chain.state import ChainState
-from calib.views import FloatArray, Views
+from calib.chain.warming import AT_TEMPERATURE, temperature_candidates, temperature_rise
+from calib.views import FloatArray
 
 
 def _act(values: FloatArray, state: ChainState) -> None:
-    warmer_K = np.nan_to_num(state.views.temperature_c - values[3])[:, None]
-    growth = warmer_K * values[:3]
+    growth = temperature_rise(values[3], state.views)[:, None] * values[:3]
     grown = rigid.compose(np.zeros_like(growth), growth)
     state.flange_from_mounted = grown @ state.flange_from_mounted
-
-
-def _candidates(views: Views) -> Sequence[Mapping[str, float]]:
-    return ({"at_temperature_c": float(np.nanmean(views.temperature_c))},)
 
 
 EFFECT = Effect(
@@ -38,7 +32,7 @@ EFFECT = Effect(
     ),
     parameters=(
         *(Parameter(f"{axis}_m_per_K", "m/K", 1e-5, -2e-3, 2e-3) for axis in "xyz"),
-        Parameter("at_temperature_c", "degC", 25.0, -100.0, 200.0, role="setting"),
+        AT_TEMPERATURE,
     ),
     act=_act,
     needs=("temperature_c",),
@@ -46,5 +40,5 @@ EFFECT = Effect(
     confounded_with=("mount_slip", "thermal_focal_drift"),
     acts_along=tuple(("mounted_pose", along) for along in ("temperature", "time", "order")),
     remedy="Use a bracket of steel, keep its temperature, or log it and let the twin correct.",
-    candidates=_candidates,
+    candidates=temperature_candidates,
 )
